@@ -1,4 +1,4 @@
-//! The archive: a bundle to bytes and back. What is read may be anything.
+//! The archive: writes a bundle as bytes, and reads one back. The input may be hostile.
 
 use std::io::{Cursor, Read as _, Write as _};
 
@@ -12,10 +12,10 @@ use super::{
     directory, files,
 };
 
-/// Most bytes of a bundle.
+/// Largest size of a bundle, bytes.
 pub const LEN_MAX: u64 = 192 << 20;
 
-/// Most bytes of what is in it.
+/// Largest size of its unpacked files together, bytes.
 pub const UNPACKED_LEN_MAX: u64 = 256 << 20;
 
 /// A file of a bundle.
@@ -23,11 +23,11 @@ pub const UNPACKED_LEN_MAX: u64 = 256 << 20;
 pub struct File {
     /// Its name.
     pub name: &'static str,
-    /// What it is, for people.
+    /// Its description, for people.
     pub about: &'static str,
     /// Its media type.
     pub encoding: &'static str,
-    /// Most bytes of it.
+    /// Its largest size, bytes.
     pub len_max: u64,
     /// Its content.
     pub content: Vec<u8>,
@@ -41,7 +41,12 @@ impl File {
 }
 
 impl Bundle {
-    /// As bytes; the same ones at every call.
+    /// The bundle as a ZIP archive; every call returns the same bytes.
+    ///
+    /// # Errors
+    ///
+    /// If the bundle or one of its files exceeds a limit, so that [`read`](Self::read) would
+    /// refuse it.
     pub fn to_bytes(&self) -> Result<Vec<u8>, BundleError> {
         let files = self.to_files();
         let description = description::describe(self, &files);
@@ -69,8 +74,12 @@ impl Bundle {
         Ok(bytes)
     }
 
-    /// Takes a bundle apart. Nothing in it has been proven yet, but that the files are those
-    /// that it describes.
+    /// Reads a bundle. This proves only that the files have the digests in the bundle's
+    /// description.
+    ///
+    /// # Errors
+    ///
+    /// If the bytes are not a bundle, exceed a limit, or have the format of another version.
     pub fn read(bytes: &[u8]) -> Result<Self, BundleError> {
         check_len(bytes.len() as u64)?;
         let mut contents = unpack(bytes, UNPACKED_LEN_MAX)?;
@@ -93,17 +102,22 @@ impl Bundle {
     }
 }
 
-/// That a length is one of a bundle.
+/// Checks the length of a bundle.
 fn check_len(len: u64) -> Result<(), BundleError> {
     if len > LEN_MAX { Err(BundleError::TooLong { len }) } else { Ok(()) }
 }
 
-/// All files by their names. `room`: most bytes of them all together.
+/// All files with their names. `room`: largest size of all files together, bytes.
+///
+/// # Errors
+///
+/// If the bytes are not a ZIP archive, if a file occurs twice, or if the files exceed `room`.
 pub fn unpack(bytes: &[u8], mut room: u64) -> Result<Vec<(String, Vec<u8>)>, BundleError> {
     let damaged = |error: &dyn std::fmt::Display| BundleError::Archive(error.to_string());
     let n_entries = directory::check(bytes).map_err(|what| damaged(&what))?;
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| damaged(&error))?;
-    // Of several files of a name the library takes the last, and other programs another.
+    // Of several files with the same name the library takes the last, and other programs another
+    // one.
     if n_entries != archive.len() {
         return Err(damaged(&"a file is in it twice"));
     }
@@ -117,7 +131,7 @@ pub fn unpack(bytes: &[u8], mut room: u64) -> Result<Vec<(String, Vec<u8>)>, Bun
         let Some(&(file, len_max)) = known.iter().find(|(known, _)| *known == name) else {
             return Err(BundleError::ExtraFile(printable(&name)));
         };
-        // What the archive says of its length may be a lie; if it is none, nothing grows.
+        // The stated length may be wrong; if it is right, the buffer never grows.
         let most = room.min(len_max);
         let stated = entry.size();
         let mut content = Vec::with_capacity(stated.min(most) as usize);
@@ -135,8 +149,7 @@ pub fn unpack(bytes: &[u8], mut room: u64) -> Result<Vec<(String, Vec<u8>)>, Bun
     Ok(contents)
 }
 
-/// That the manifest is of a version that this program can check, which its other files may
-/// not be like.
+/// Checks that this program can read the manifest's version, before it reads the other files.
 fn check_version(manifest: &File) -> Result<(), BundleError> {
     #[derive(Deserialize)]
     struct Versions {
@@ -156,7 +169,7 @@ fn check_version(manifest: &File) -> Result<(), BundleError> {
     Ok(())
 }
 
-/// Foreign text in one short line.
+/// Text from a stranger as one short line.
 pub fn printable(text: &str) -> String {
     text.chars().take(200).flat_map(char::escape_debug).collect()
 }

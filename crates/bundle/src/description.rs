@@ -15,10 +15,11 @@ use super::{Bundle, BundleError, archive::File, files};
 /// The file with the description.
 pub const DESCRIPTION: &str = "ro-crate-metadata.json";
 
-/// Most bytes of it. This program writes some 4 KiB; who publishes a bundle may add to them.
+/// Largest size of the description, bytes. This program writes about 4 KiB; publishers may add to
+/// it.
 pub const LEN_MAX: u64 = 4 << 20;
 
-/// Bytes of the longest text in it that is looked at: a SHA-256 has 64.
+/// Largest length of a text to look at, bytes: a SHA-256 has 64.
 const SHORT_LEN_MAX: usize = 64;
 
 /// Describes a bundle that has these files.
@@ -84,8 +85,12 @@ pub fn describe(bundle: &Bundle, files: &[File]) -> String {
     serde_json::to_string_pretty(&document).expect("JSON serialises")
 }
 
-/// Checks that the files are those that a description has the digests of. It may say more
-/// than this program writes: authors, a license.
+/// Checks that the files have the digests in the description. The description may contain more
+/// than this program writes, such as authors and a license.
+///
+/// # Errors
+///
+/// If the description cannot be read, or if a file is missing in it or has another digest.
 pub fn check(description: &[u8], files: &[File]) -> Result<(), BundleError> {
     let document: Document = serde_json::from_slice(description)
         .map_err(|error| BundleError::malformed(DESCRIPTION, &error))?;
@@ -98,14 +103,15 @@ pub fn check(description: &[u8], files: &[File]) -> Result<(), BundleError> {
     Ok(())
 }
 
-/// What is read of a description: a stranger's may list millions of things, of any kind.
+/// The part of a description that is read: one from a stranger may list millions of entities of
+/// any kind.
 #[derive(Deserialize)]
 struct Document {
     #[serde(rename = "@graph")]
     graph: Graph,
 }
 
-/// The entities that may be files of a bundle, as many as a bundle has files.
+/// The entities that may be files of a bundle, at most as many as a bundle has files.
 struct Graph(Vec<Entity>);
 
 #[derive(Deserialize)]
@@ -116,7 +122,7 @@ struct Entity {
     sha256: Short,
 }
 
-/// A text that may be a name of a file or a digest; anything else counts as an empty one.
+/// A text that may be a file name or a digest; any other value counts as empty.
 #[derive(Default)]
 struct Short(String);
 
@@ -198,7 +204,7 @@ impl<'de> Visitor<'de> for ShortVisitor {
     }
 }
 
-/// A time of milliseconds since 1970 UTC, to the second.
+/// Formats milliseconds since 1970 UTC, to the second.
 fn rfc3339(at_ms: u64) -> String {
     let time = OffsetDateTime::from_unix_timestamp((at_ms / 1000) as i64);
     let text = time.ok().and_then(|time| time.format(&Rfc3339).ok());

@@ -1,23 +1,27 @@
-//! The directory at the end of a ZIP archive, looked at before a library goes through it.
+//! Checks the directory at the end of a ZIP archive, before a library reads it.
 //!
-//! A library makes hundreds of bytes of each entry, takes the number of entries from the archive,
-//! and looks for another directory further ahead where it does not like the last one. So what it
-//! is shown has one short directory, which it likes.
+//! The library allocates hundreds of bytes per entry, trusts the number of entries in the
+//! archive, and searches backwards for another directory if the last one is invalid. So this
+//! module accepts only archives with a single short, valid directory.
 
 use std::io::Cursor;
 
 use zip::ZipArchive;
 
-/// Bytes of the last record of an archive without a comment.
+/// Length of the last record of an archive without a comment, bytes.
 const RECORD_LEN: usize = 22;
 
-/// How it begins.
+/// The first bytes of that record.
 const RECORD_MARK: &[u8] = b"PK\x05\x06";
 
-/// Most bytes of a directory; that of a bundle has some 600.
+/// Largest size of a directory, bytes; that of a bundle has some 600.
 const LEN_MAX: usize = 16 << 10;
 
-/// The number of entries of an archive that a library can go through in little memory.
+/// Checks an archive, and returns its number of entries.
+///
+/// # Errors
+///
+/// If the library could need much memory to read the archive.
 pub fn check(bytes: &[u8]) -> Result<usize, String> {
     let no_record = "no record of an archive is at its end";
     let (ahead, record) = bytes.split_last_chunk::<RECORD_LEN>().ok_or(no_record)?;
@@ -40,7 +44,7 @@ pub fn check(bytes: &[u8]) -> Result<usize, String> {
     if marks.count() != 1 {
         return Err("it has several last records".to_owned());
     }
-    // It begins with the directory, and its record has to say so.
+    // The directory begins here, and the last record has to point to it.
     let at = len + 16;
     alone[at..at + 4].fill(0);
     let archive = ZipArchive::new(Cursor::new(alone)).map_err(|error| error.to_string())?;

@@ -1,4 +1,4 @@
-//! The files of a bundle: what each holds, as bytes and back.
+//! The files of a bundle: writes the content of each as bytes, and reads it back.
 
 use evolution::{Champion, ChampionSource, Digest, Real, Statistics};
 use experiment_file::limits;
@@ -16,7 +16,7 @@ const LOG: &str = "fitness-log.bin";
 const KEYFRAMES: &str = "keyframes.bin";
 const CHAMPION: &str = "champion.json";
 
-/// All files beside the description, empty, in the order of the archive.
+/// All files except the description, empty, in the order of the archive.
 pub fn all() -> [File; 6] {
     let file = |name, about, encoding, len_max| File {
         name,
@@ -29,7 +29,7 @@ pub fn all() -> [File; 6] {
     let file_len_max = limits::FILE_BYTES as u64;
     let (about, most) = ("Versions, digests and how the experiment ended", UNPACKED_LEN_MAX);
     [
-        // Of a fork it lists what was changed in two experiment files.
+        // For a fork, it lists the differences between two experiment files.
         file(MANIFEST, about, json, 4 * file_len_max),
         file(
             EXPERIMENT,
@@ -44,7 +44,7 @@ pub fn all() -> [File; 6] {
     ]
 }
 
-/// Most bytes of a line of `history.csv`; usual ones have 200.
+/// Largest length of a line of `history.csv`, bytes; usual ones have 200.
 const LINE_LEN_MAX: usize = 1 << 10;
 
 /// A row of `history.csv`.
@@ -65,7 +65,7 @@ struct Row {
 }
 
 impl Bundle {
-    /// The files beside the description.
+    /// The files except the description.
     pub(super) fn to_files(&self) -> [File; 6] {
         let mut files = all();
         files[0].content = write_manifest(&self.manifest);
@@ -82,7 +82,7 @@ impl Bundle {
         files
     }
 
-    /// The bundle that has these files.
+    /// Reads a bundle from these files.
     pub(super) fn from_files(files: [File; 6]) -> Result<Self, BundleError> {
         let [manifest, experiment, history, log, keyframes, champion] = files;
         let malformed = BundleError::malformed;
@@ -91,7 +91,7 @@ impl Bundle {
         };
         let about: Manifest = serde_json::from_slice(&manifest.content)
             .map_err(|error| malformed(MANIFEST, &error))?;
-        // There is one way to write each of them, so every bit means something.
+        // Each file has only one valid encoding, so every bit counts.
         let other_way = |file| malformed(file, &"it is not written as a bundle is");
         if write_manifest(&about) != manifest.content {
             return Err(other_way(MANIFEST));
@@ -102,8 +102,9 @@ impl Bundle {
             return Err(other_way(HISTORY));
         }
         drop(history);
-        // A row of the history is longer than an entry or a state is in memory before it has
-        // any content. What is of other generations is wrong, and its kind is found later.
+        // A row of the history is longer than an empty entry or state in memory, so the number of
+        // rows bounds the others. Entries of other generations are wrong; a later check reports
+        // them.
         let n_max = rows.len() as u64 + 1;
         let entries = read_frames(&log.content, n_max).map_err(|what| malformed(LOG, &what))?;
         drop(log);
@@ -121,7 +122,7 @@ impl Bundle {
 
 /// A champion as JSON: `swarmctl simulate --genotype` takes it.
 pub fn champion_json(champion: &Champion) -> String {
-    // Databases do not keep the sign of zero: where it may be lost, it is left out.
+    // Databases do not keep the sign of zero, so this file omits the sign where it may be lost.
     let Champion { generation, source, genotype, trial_fitness, held_out, judged } = champion;
     let individual = match source {
         ChampionSource::Individual(index) => Some(index),
@@ -171,9 +172,9 @@ fn write_history(history: &[GenerationRow]) -> Vec<u8> {
     table.into_inner().expect("memory can be written")
 }
 
-/// `n_max`: most generations.
+/// Reads the history. `n_max`: largest number of generations.
 fn read_history(bytes: &[u8], n_max: u64) -> Result<Vec<GenerationRow>, String> {
-    // In a record, a comma takes the memory of many bytes; a quote would hide ends of lines.
+    // A comma takes many bytes in a parsed record, and a quote would hide line ends.
     let is_long = |line: &[u8]| line.len() > LINE_LEN_MAX;
     if bytes.contains(&b'"') || bytes.split(|&byte| byte == b'\n').any(is_long) {
         return Err(format!("a line has a quote, or more than {LINE_LEN_MAX} bytes"));
@@ -201,26 +202,26 @@ fn read_history(bytes: &[u8], n_max: u64) -> Result<Vec<GenerationRow>, String> 
     Ok(history)
 }
 
-/// Appends bytes with their length before them: 8 bytes, the lowest first.
+/// Appends bytes after their length, which has 8 bytes, little-endian.
 fn frame(file: &mut Vec<u8>, bytes: &[u8]) {
     file.extend((bytes.len() as u64).to_le_bytes());
     file.extend(bytes);
 }
 
-/// The number at the beginning, and what follows it.
+/// The number at the beginning, and the remaining bytes.
 fn number(bytes: &[u8]) -> Option<(u64, &[u8])> {
     let (number, rest) = bytes.split_first_chunk()?;
     Some((u64::from_le_bytes(*number), rest))
 }
 
-/// What [`frame`] appended, and what follows it.
+/// The bytes of the first [`frame`], and the remaining bytes.
 fn unframe(bytes: &[u8]) -> Option<(Vec<u8>, &[u8])> {
     let (len, rest) = number(bytes)?;
     let (content, rest) = rest.split_at_checked(usize::try_from(len).ok()?)?;
     Some((content.to_vec(), rest))
 }
 
-/// `n_max`: most of them.
+/// Reads frames. `n_max`: largest number of frames.
 fn read_frames(mut bytes: &[u8], n_max: u64) -> Result<Vec<Vec<u8>>, String> {
     let mut frames = Vec::new();
     while !bytes.is_empty() {
@@ -234,7 +235,7 @@ fn read_frames(mut bytes: &[u8], n_max: u64) -> Result<Vec<Vec<u8>>, String> {
     Ok(frames)
 }
 
-/// `n_max`: most of them.
+/// Reads keyframes. `n_max`: largest number of keyframes.
 fn read_keyframes(mut bytes: &[u8], n_max: u64) -> Result<Vec<(u64, Vec<u8>)>, String> {
     let mut keyframes = Vec::new();
     while !bytes.is_empty() {

@@ -1,5 +1,5 @@
-//! Bundles that are made to take memory: each is refused by a process of its own, whose peak
-//! is measured.
+//! Bundles made to exhaust memory: for each, a process of its own refuses it, and the test
+//! measures the process's peak memory.
 
 use std::{env, fs, io::Write as _, process::Command};
 
@@ -13,16 +13,16 @@ use super::{
     *,
 };
 
-/// Bytes of what makes a bundle hostile.
+/// Size of a bundle's hostile part, bytes.
 const LEN: usize = 48 << 20;
 
-/// Most bytes of memory that a bundle takes per byte of what is in it.
+/// Largest memory of a bundle, per byte of its content.
 const FACTOR: usize = 4;
 
-/// What a process takes beside that: of lists without numbers, no bound is proportional.
+/// Further memory of a process, bytes: the bound for lists without numbers is not proportional.
 const BASE: usize = 160 << 20;
 
-/// The bundle that a process of this test is to read.
+/// Names the bundle that a process of this test reads.
 const VARIABLE: &str = "SWARM_TEST_BUNDLE";
 
 fn repeated(text: &str) -> Vec<u8> {
@@ -33,7 +33,7 @@ fn between(begin: &str, repeated: Vec<u8>, end: &str) -> Vec<u8> {
     [begin.as_bytes(), &repeated, end.as_bytes()].concat()
 }
 
-/// A bundle of which one file has another content; it describes that as its own.
+/// A bundle with another content of one file, and a matching description.
 fn with(bundle: &Bundle, name: &str, content: Vec<u8>) -> Vec<u8> {
     let mut files = bundle.to_files();
     if let Some(file) = files.iter_mut().find(|file| file.name == name) {
@@ -57,9 +57,9 @@ fn archive(files: impl IntoIterator<Item = (&'static str, Vec<u8>)>) -> Vec<u8> 
     archive.finish().unwrap().into_inner()
 }
 
-/// An entry of the log or a state whose lists are empty, all but one of them.
+/// An entry of the log, or a state, in which all lists but one are empty.
 fn empty_lists(before: &[u8]) -> Vec<u8> {
-    // 40 million as a number of variable length, and then a zero for each of them.
+    // 40 million as a number of variable length, and then as many zeros.
     let mut bytes = [before, &[0x80, 0xb4, 0x89, 0x13]].concat();
     bytes.resize(40_000_000, 0);
     bytes
@@ -87,7 +87,7 @@ fn many_entries() -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
-/// A bundle that says of a file of a few bytes that it has four billion.
+/// A bundle that states four billion bytes for a file of a few bytes.
 fn lying_lengths() -> Vec<u8> {
     let mut bytes = archive(contents(bundle()));
     let marks: Vec<(usize, usize)> = bytes
@@ -140,7 +140,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// Reads a bundle, and goes through it; returns why not.
+/// Reads and verifies a bundle; returns why it is refused.
 fn refusal(bytes: &[u8]) -> String {
     let read = match Bundle::read(bytes) {
         Ok(read) => read,
@@ -161,7 +161,7 @@ fn refusal(bytes: &[u8]) -> String {
     }
 }
 
-/// The most memory that this process has had, in bytes; none where the system does not say.
+/// Peak memory of this process, bytes; `None` if the system does not tell.
 fn peak() -> Option<usize> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

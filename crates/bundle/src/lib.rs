@@ -1,9 +1,9 @@
-//! Bundles: an ended experiment as one file, with everything that its results follow from.
+//! Bundles: an ended experiment as one self-verifying file, with everything from which its
+//! results follow.
 //!
-//! A bundle is a ZIP archive and an [RO-Crate]. [`Bundle::read`] takes one apart, and trusts
-//! nothing of it; [`Verification`] goes through the experiment again and says what was proven;
-//! whoever simulates the [batches](Batch) that it hands out proves the fitness, too.
-//! `docs/history.md` has the format.
+//! A bundle is a ZIP archive and an [RO-Crate]. [`Bundle::read`] reads one without trusting it.
+//! [`Verification`] repeats the experiment's evolution and returns a [`Proof`]. It hands out
+//! [batches](Batch), whose simulation also proves the fitness. `docs/history.md` has the format.
 //!
 //! [RO-Crate]: https://w3id.org/ro/crate/1.3
 
@@ -24,29 +24,28 @@ pub use files::champion_json;
 pub use sample::Sample;
 pub use verification::{Batch, Claim, Flaw, Proof, Verification};
 
-/// An ended experiment, and everything that its results follow from.
+/// An ended experiment, and everything from which its results follow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bundle {
-    /// What it is about.
+    /// Names the experiment, its versions and digests.
     pub manifest: Manifest,
-    /// The experiment file in canonical form, seed included.
+    /// The experiment file in canonical form, including the seed.
     pub config_json: String,
-    /// Every generation, with those that a fork shares with its parent.
+    /// Every generation, including those that a fork shares with its parent.
     pub history: Vec<GenerationRow>,
-    /// What evolution was told of each generation of its own, as
-    /// [`evolution::Told::to_bytes`] writes it.
+    /// The fitness log: for each generation of its own the bytes of
+    /// [`evolution::Told::to_bytes`].
     pub log: Vec<Vec<u8>>,
-    /// Evolution's state, by the number of generations before it; in order, the first one
-    /// before the first generation of its own.
+    /// States of evolution in order; the first one precedes the first generation of its own.
     pub keyframes: Keyframes,
     /// The champion, as [`champion_json`] writes it.
     pub champion_json: String,
 }
 
-/// States of evolution, by the number of generations before each; in order.
+/// States of evolution, each with the number of generations before it, in order.
 pub type Keyframes = Vec<(u64, Vec<u8>)>;
 
-/// What a bundle is about.
+/// The manifest of a bundle: versions, digests, and the end of the experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -62,40 +61,40 @@ pub struct Manifest {
     pub digest: Digest,
     /// How it ended: `completed`, `failed` or `cancelled`.
     pub state: String,
-    /// Why, if not by completing its generations.
+    /// Why it ended, if it did not complete its generations.
     pub reason: String,
-    /// Milliseconds since 1970 UTC.
+    /// Time of submission, milliseconds since 1970 UTC.
     pub submitted_at_ms: u64,
-    /// Where it comes from, if it is a fork.
+    /// Its origin, if it is a fork.
     pub fork: Option<ForkOf>,
 }
 
-/// Where an experiment comes from that goes on from the state of another one.
+/// The origin of a fork, an experiment that continues the state of another one, its parent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ForkOf {
-    /// The last generation that both have.
+    /// The last generation, from 0, that fork and parent share.
     pub generation: u64,
-    /// The link of the digest chain on which its own first generation hangs.
+    /// The link of the digest chain before the fork's first own generation.
     pub link: Digest,
-    /// What is changed, one line each.
+    /// The changes of the experiment file, one line each.
     pub changes: Vec<String>,
 }
 
 /// A row of the history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GenerationRow {
-    /// Of the individuals' mean fitness.
+    /// Statistics of the individuals' mean fitness.
     pub statistics: Statistics,
-    /// Episodes simulated.
+    /// Number of simulated episodes.
     pub episodes: u64,
-    /// Wall-clock time.
+    /// Wall-clock time, ms.
     pub duration_ms: u64,
-    /// Milliseconds since 1970 UTC.
+    /// Time of completion, milliseconds since 1970 UTC.
     pub completed_at_ms: u64,
-    /// Workers at its end.
+    /// Number of connected workers at its end.
     pub workers: u64,
-    /// Share of the fleet's time not spent computing.
+    /// Share of the fleet's time without computation, 0 to 1.
     pub idle_share: f64,
     /// Link of the digest chain.
     pub digest: Digest,
@@ -104,36 +103,36 @@ pub struct GenerationRow {
 /// Version of the format that this code reads and writes.
 pub const FORMAT: u32 = 1;
 
-/// Why a file is no bundle, or none that this program can check.
+/// Why a file is not a bundle, or is one that this program cannot check.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BundleError {
-    /// Too large to look at.
+    /// The file is too large to read.
     #[error("it has {len} bytes, and a bundle at most {LEN_MAX}")]
     TooLong {
         /// Its length.
         len: u64,
     },
-    /// No archive, or a damaged one.
-    #[error("it is no bundle, or cut off or damaged: {0}")]
+    /// The file is not a ZIP archive, or is damaged.
+    #[error("it is not a bundle, or it is cut off or damaged: {0}")]
     Archive(String),
-    /// Unpacked, it would take too much room.
-    #[error("unpacked it has more than {UNPACKED_LEN_MAX} bytes, so it is no bundle")]
+    /// The unpacked files are too large together.
+    #[error("unpacked it has more than {UNPACKED_LEN_MAX} bytes, so it is not a bundle")]
     UnpackedTooLong,
-    /// So would one of its files.
-    #[error("its file `{file}` has more than {len_max} bytes, so it is no bundle")]
+    /// One of the unpacked files is too large.
+    #[error("its file `{file}` has more than {len_max} bytes, so it is not a bundle")]
     FileTooLong {
         /// The file.
         file: &'static str,
         /// Most bytes of it.
         len_max: u64,
     },
-    /// A file too many.
+    /// An unexpected file.
     #[error("it has the file `{0}`, which is not part of a bundle")]
     ExtraFile(String),
-    /// A file too few.
+    /// A missing file.
     #[error("it lacks the file `{0}`")]
     MissingFile(&'static str),
-    /// A file that says something else.
+    /// A file with invalid content.
     #[error("its file `{file}` cannot be read: {what}")]
     Malformed {
         /// The file.
@@ -141,10 +140,10 @@ pub enum BundleError {
         /// What is wrong.
         what: String,
     },
-    /// A file that is not the one that was described.
-    #[error("its file `{0}` is not the one that its description has the SHA-256 of")]
+    /// A file whose digest is not the one in the description.
+    #[error("its file `{0}` does not have the SHA-256 that its description states")]
     OtherFile(&'static str),
-    /// Written in another version of the format.
+    /// The bundle has another version of the format.
     #[error("it has the format {found} of bundles, written by {program}: that version reads it")]
     Format {
         /// The format.
@@ -152,7 +151,7 @@ pub enum BundleError {
         /// The program that wrote it.
         program: String,
     },
-    /// Computed by another version of the simulation.
+    /// Another version of the simulation computed the experiment.
     #[error(
         "it was computed by the simulation \"{simulation}\" and written by {program}, which can \
          check it; this version has \"{}\"",
@@ -167,14 +166,14 @@ pub enum BundleError {
 }
 
 impl BundleError {
-    /// A file that says something else. `what`: may have a stranger's words in it.
+    /// An error about a file with invalid content. `what`: may contain text from a stranger.
     fn malformed(file: &'static str, what: &dyn fmt::Display) -> Self {
         Self::Malformed { file, what: archive::printable(&what.to_string()) }
     }
 }
 
 impl Bundle {
-    /// The first generation of its own.
+    /// The first generation that is not shared with a parent.
     pub fn first_own(&self) -> u64 {
         self.manifest.fork.as_ref().map_or(0, |fork| fork.generation + 1)
     }

@@ -1,25 +1,25 @@
-//! Which generations are simulated again: the run itself decides, so nobody chooses them.
+//! Chooses the generations to simulate again. The run's own digest decides, so no person can
+//! choose them.
 
 use std::collections::BTreeSet;
 
 use evolution::Digest;
 use sha2::{Digest as _, Sha256};
 
-/// Which generations are simulated again.
+/// The generations to simulate again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sample {
     /// All.
     All,
-    /// So many, drawn by the last link of the digest chain.
+    /// This many generations, drawn by the last link of the digest chain.
     Drawn(u64),
 }
 
 impl Sample {
-    /// The generations from `first` to `end`, without that. `digest`: the last link.
+    /// The sampled generations within `first..end`. `digest`: the last link.
     ///
-    /// Draw k is the first 8 bytes, little-endian, of the SHA-256 of
-    /// `swarmevo verify 1\n<link, hexadecimal>\n<k>`, modulo the number of generations; draws that
-    /// were drawn before are skipped.
+    /// Draw k is the first 8 bytes, little-endian, of the SHA-256 of `swarmevo verify 1\n<link,
+    /// hexadecimal>\n<k>`, modulo the number of generations; repeated draws are skipped.
     pub fn generations(self, digest: Digest, first: u64, end: u64) -> BTreeSet<u64> {
         let n_generations = end.saturating_sub(first);
         let n_wanted = match self {

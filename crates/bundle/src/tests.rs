@@ -1,4 +1,4 @@
-//! Whatever is changed in a bundle is found.
+//! Verification finds every change of a bundle.
 
 use std::{fs, io::Write as _, sync::OnceLock};
 
@@ -33,7 +33,7 @@ fn simulated(simulation: &Simulation, batch: &Batch) -> Vec<Vec<f64>> {
     batch.genotypes.iter().map(fitness).collect()
 }
 
-/// A run to its end; `change`: what is told instead of the fitness of a generation.
+/// A complete run; `change`: replaces the fitness of a generation.
 fn evolved(
     config: &ExperimentConfig,
     mut evolution: Evolution,
@@ -117,7 +117,7 @@ pub fn bundle() -> &'static Bundle {
     BUNDLE.get_or_init(|| evolved(&config(), started(&config()), None, Vec::new(), |_, _| ()))
 }
 
-/// Goes through a bundle; simulates what the sample says.
+/// Verifies a bundle, and simulates the sampled generations.
 fn verify(bundle: &Bundle, sample: Sample) -> Result<Proof, Flaw> {
     let mut verification = Verification::begin(bundle, sample)?;
     while let Some(batches) = verification.advance()? {
@@ -128,14 +128,14 @@ fn verify(bundle: &Bundle, sample: Sample) -> Result<Proof, Flaw> {
     Ok(verification.finish())
 }
 
-/// Goes through a bundle without a simulation.
+/// Verifies a bundle without simulations.
 fn links(bundle: &Bundle) -> Result<(), Flaw> {
     let mut verification = Verification::begin(bundle, Sample::Drawn(0))?;
     while verification.advance()?.is_some() {}
     Ok(())
 }
 
-/// An archive of any files.
+/// An archive of arbitrary files.
 fn archive<'a>(files: impl IntoIterator<Item = (&'a str, Vec<u8>)>) -> Vec<u8> {
     packed(files, CompressionMethod::Stored)
 }
@@ -185,7 +185,7 @@ fn a_bit_that_flips_in_any_file_is_found() {
     let mut n_flips = 0;
     for (place, (name, content)) in contents.iter().enumerate().skip(1) {
         let n_bits = content.len() * 8;
-        // A step that meets all bits of a byte.
+        // The step reaches every bit of a byte.
         for bit in (0..n_bits).step_by((n_bits / 600) | 1) {
             let mut flipped = contents.clone();
             flipped[place].1[bit / 8] ^= 1 << (bit % 8);
@@ -199,7 +199,7 @@ fn a_bit_that_flips_in_any_file_is_found() {
 
 #[test]
 fn a_bit_that_flips_is_found_without_the_digests_of_files() {
-    // Whoever changes a file can describe it again.
+    // An attacker who changes a file can update its description.
     let contents = contents(bundle());
     for (name, n_flips) in [("fitness-log.bin", 80), ("keyframes.bin", 40), ("champion.json", 20)] {
         let place = contents.iter().position(|(found, _)| *found == name).unwrap();
@@ -261,9 +261,9 @@ fn what_is_no_bundle_is_refused_in_one_line() {
         let more = [(name, b"x".to_vec())];
         archive(contents(bundle()).into_iter().chain(more))
     };
-    // Its length is looked at before anything else of it.
+    // The length is checked first.
     refused(&vec![0; LEN_MAX as usize + 1], "and a bundle at most 201326592");
-    // The second file of a name: as long, so that no offset changes.
+    // The second file of the same name has the same length, so that no offset changes.
     let mut twice = with("champion.jsom");
     while let Some(at) = twice.windows(13).position(|name| name == b"champion.jsom") {
         twice[at + 12] = b'n';

@@ -1,8 +1,8 @@
-//! Goes through an experiment again, and says what of its bundle was proven.
+//! Repeats an experiment's evolution, and proves the claims of its bundle.
 //!
 //! Evolution is a function of seed and fitness. So the chain of digests, the history, the
-//! keyframes and the champion follow from the experiment file and the fitness log alone;
-//! only that the fitness itself is right takes simulations, which the caller does.
+//! keyframes and the champion follow from the experiment file and the fitness log. Only the
+//! fitness itself needs simulations, which the caller runs.
 
 use std::{collections::BTreeSet, fmt};
 
@@ -15,66 +15,66 @@ use sim_core::{FINGERPRINT, Simulation, TrialSet, panic_to_failure};
 
 use super::{Bundle, GenerationRow, Sample, champion_json};
 
-/// An experiment of which a part has been gone through.
+/// A verification in progress.
 #[derive(Debug)]
 pub struct Verification<'a> {
     bundle: &'a Bundle,
     simulation: Simulation,
     n_trials: u32,
     evolution: Evolution,
-    /// Whose trials are simulated again.
+    /// The generations to simulate again.
     sample: BTreeSet<u64>,
     n_keyframes: usize,
     n_episodes: u64,
     champion: Option<Champion>,
 }
 
-/// What a bundle claims.
+/// A claim of a bundle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Claim {
-    /// The experiment file is that of the chain's first link, and makes sense.
+    /// The experiment file is valid, and has the digest of the chain's first link.
     Experiment,
-    /// Every link follows from the one before, the genotypes that evolution draws, and the log.
+    /// Every link follows from the previous one, the genotypes that evolution draws, and the log.
     Chain,
-    /// So does what the history says of fitness.
+    /// The fitness in the history follows from the log.
     History,
     /// The keyframes are the states of evolution.
     Keyframes,
-    /// The champion is the one that the log leads to, and so is the last link.
+    /// The champion and the last link follow from the log.
     Champion,
-    /// A simulation gives the fitness of the log.
+    /// Simulations give the fitness in the log.
     Simulation,
 }
 
-/// What is wrong with a bundle.
+/// A claim of a bundle that does not hold.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{claim}: {what}")]
 pub struct Flaw {
-    /// The claim that does not hold.
+    /// The claim.
     pub claim: Claim,
-    /// Where, and what.
+    /// The place, and the difference.
     pub what: String,
 }
 
-/// What was proven, and what was not.
+/// The result of a verification without flaws.
 #[derive(Debug)]
 pub struct Proof {
-    /// Each claim with what it comes to.
+    /// Each proven claim, with its statement for people.
     pub proven: Vec<(Claim, String)>,
-    /// What nobody can know from a bundle.
+    /// Statements that a bundle alone cannot prove.
     pub unproven: Vec<String>,
     /// The champion.
     pub champion: Option<Champion>,
 }
 
-/// Genotypes to be simulated again, all in the same trials.
+/// Genotypes to simulate again, all in the same trials.
 #[derive(Debug, Clone)]
 pub struct Batch {
-    /// Which worlds and noise.
+    /// The trial set.
     pub trial_set: TrialSet,
     /// The genotypes.
     pub genotypes: evolution::Population,
-    /// Of each the fitness that the log has, trial by trial from 0.
+    /// The fitness in the log; shape `[genotype][trial]`, trials from 0.
     pub trial_fitness: Vec<Vec<f64>>,
 }
 
@@ -103,7 +103,11 @@ impl Batch {
         Self { trial_set, genotypes, trial_fitness: trial_fitness.to_vec() }
     }
 
-    /// Compares with what a simulation gives, bit for bit.
+    /// Compares the log with simulated fitness of the same shape, bit for bit.
+    ///
+    /// # Errors
+    ///
+    /// A flaw at the first difference.
     pub fn compare(&self, simulated: &[Vec<f64>]) -> Result<(), Flaw> {
         let flaw = |what: String| Claim::Simulation.flaw(format!("{}: {what}", self.trial_set));
         if simulated.len() != self.trial_fitness.len() {
@@ -125,8 +129,12 @@ impl Batch {
 }
 
 impl<'a> Verification<'a> {
-    /// Checks everything that comes before the first generation. `sample`: the generations
-    /// whose trials will be handed out to be simulated again.
+    /// Checks everything before the first generation. `sample`: the generations that
+    /// [`advance`](Self::advance) hands out to simulate again.
+    ///
+    /// # Errors
+    ///
+    /// The first flaw.
     pub fn begin(bundle: &'a Bundle, sample: Sample) -> Result<Self, Flaw> {
         let flaw = |what: &dyn fmt::Display| Claim::Experiment.flaw(what);
         let (config, _) = ExperimentConfig::from_json(&bundle.config_json, "", ALGORITHMS)
@@ -179,24 +187,28 @@ impl<'a> Verification<'a> {
         })
     }
 
-    /// What simulates the batches.
+    /// The simulation that computes the batches.
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
     }
 
-    /// Generations that have been gone through, and all.
+    /// The number of repeated generations, and the number of all.
     pub fn progress(&self) -> (u64, u64) {
         let first = self.bundle.first_own();
         (self.evolution.n_generations() - first, self.bundle.log.len() as u64)
     }
 
-    /// Goes through the next generation; what is to be simulated again of it, or none if there
-    /// is no generation left.
+    /// Repeats the next generation. Returns its batches to simulate again, or `None` if no
+    /// generation is left.
+    ///
+    /// # Errors
+    ///
+    /// The first flaw.
     pub fn advance(&mut self) -> Result<Option<Vec<Batch>>, Flaw> {
         let generation = self.evolution.n_generations();
         let place = (generation - self.bundle.first_own()) as usize;
         let Some(entry) = self.bundle.log.get(place) else { return Ok(None) };
-        // A forged state of a fork may be one that no algorithm can be in.
+        // A forged state of a fork may be impossible for any algorithm.
         let step = panic_to_failure(|| Ok(self.step(generation, entry)));
         let flaw = |what: String| Claim::Chain.flaw(format!("generation {generation}: {what}"));
         step.unwrap_or_else(|what| Err(flaw(what))).map(Some)
@@ -254,7 +266,7 @@ impl<'a> Verification<'a> {
         Ok(batches)
     }
 
-    /// The end of the run; returns what was evaluated for it.
+    /// Checks the end of the run; returns its evaluations.
     fn conclude(&mut self, told: &Told) -> Result<Vec<Batch>, Flaw> {
         let outcome = self.evolution.outcome(told);
         let outcome = outcome.map_err(|error| Claim::Champion.flaw(error))?;
@@ -286,8 +298,7 @@ impl<'a> Verification<'a> {
         Ok(())
     }
 
-    /// What was proven, once all generations have been gone through and all batches have been
-    /// simulated.
+    /// The proof, to call after the last generation, if all batches agree with their simulation.
     pub fn finish(self) -> Proof {
         let Self { bundle, evolution, sample, n_keyframes, n_episodes, champion, .. } = self;
         let (first, end) = (bundle.first_own(), evolution.n_generations());
@@ -341,8 +352,8 @@ impl<'a> Verification<'a> {
     }
 }
 
-/// The state that a fork begins with. `own`: link -1 of its configuration; `new`: an evolution
-/// of the same shape.
+/// The first state of a fork. `own`: link -1 of its configuration; `new`: an evolution of the
+/// same shape.
 fn fork_start(bundle: &Bundle, own: Digest, new: &Evolution) -> Result<Evolution, Flaw> {
     let flaw = |what: &dyn fmt::Display| Claim::Chain.flaw(format!("where it was forked: {what}"));
     let Some(fork) = &bundle.manifest.fork else { return Err(flaw(&"it is no fork")) };
@@ -363,8 +374,8 @@ fn fork_start(bundle: &Bundle, own: Digest, new: &Evolution) -> Result<Evolution
     Ok(state)
 }
 
-/// What was found, or what is stated where that is infinite because the program that wrote it
-/// had sums that overflow.
+/// The found value; or the stated one if it is infinite, because sums overflowed in the version
+/// that wrote it.
 fn as_stated(found: f64, stated: f64) -> f64 {
     let overflowed = stated.is_infinite() && found.abs() > f64::MAX.sqrt() / 1e9;
     if overflowed { stated } else { found }

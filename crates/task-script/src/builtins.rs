@@ -1,4 +1,4 @@
-//! What functions, methods and operators do that scripts have beside the host's.
+//! The functions, methods and operators of the language itself.
 
 use std::cmp::Ordering;
 use std::rc::Rc;
@@ -9,7 +9,7 @@ use crate::key::Key;
 use crate::meter::{Meter, cost};
 use crate::value::{Dict, ELEMENT, List, Value};
 
-/// The result of an operator of two numbers, or of what else it takes.
+/// The result of a binary operator.
 pub(crate) fn binary(operator: Binary, a: &Value, b: &Value, meter: &Rc<Meter>) -> Outcome<Value> {
     if let (Value::Int(a), Value::Int(b)) = (a, b) {
         return integers(operator, *a, *b, meter);
@@ -42,7 +42,7 @@ fn integers(operator: Binary, a: i64, b: i64, meter: &Meter) -> Outcome<Value> {
         Binary::Subtract => a.checked_sub(b),
         Binary::Multiply => a.checked_mul(b),
         Binary::FloorDivide if b != 0 => a.checked_div_euclid(b).map(|quotient| {
-            // Rounds down, whatever the signs.
+            // Rounds down for all signs.
             if b < 0 && a.rem_euclid(b) != 0 { quotient - 1 } else { quotient }
         }),
         Binary::Remainder if b != 0 => a
@@ -93,7 +93,8 @@ fn floats(operator: Binary, a: f64, b: f64, meter: &Meter) -> Outcome<Value> {
     })
 }
 
-/// The exponent of a number as it is stored; `fmod` goes through the difference of two bit by bit.
+/// The stored exponent of a number; `fmod` takes one step per bit of the difference of two
+/// exponents.
 fn exponent(value: f64) -> usize {
     (value.to_bits() >> 52 & 0x7ff) as usize
 }
@@ -154,7 +155,7 @@ pub(crate) fn order(a: &Value, b: &Value, meter: &Meter) -> Outcome<Ordering> {
     }
 }
 
-/// Why two values have no order.
+/// The error for two values without an order.
 pub(crate) fn without_order(a: &Value, b: &Value) -> Fault {
     match (a.number(), b.number()) {
         (Some(_), Some(_)) => "not a number (NaN) has no order".into(),
@@ -162,7 +163,7 @@ pub(crate) fn without_order(a: &Value, b: &Value) -> Fault {
     }
 }
 
-/// The elements that a loop goes through: of a list, or the keys of a dict.
+/// The elements of a loop: those of a list, or the keys of a dict.
 pub(crate) fn elements(value: &Value, meter: &Rc<Meter>) -> Outcome<Vec<Value>> {
     match value {
         Value::List(list) => Ok(list.items()?),
@@ -176,7 +177,7 @@ fn keys(dict: &Dict, meter: &Rc<Meter>) -> Outcome<Vec<Value>> {
     Ok(keys.iter().map(|key| key.value(meter)).collect::<Result<_, _>>()?)
 }
 
-/// The place in a list of so many elements; negative indices count from the end.
+/// The position in a list of `n` elements; negative indices count from the end.
 pub(crate) fn place(index: &Value, n: usize) -> Outcome<usize> {
     let index = match index {
         Value::Int(index) => *index,
@@ -225,7 +226,7 @@ pub(crate) fn slice(value: &Value, from: &Value, to: &Value, meter: &Rc<Meter>) 
     Ok(new(part, meter)?)
 }
 
-/// A method of lists or dicts.
+/// Calls a method of a list or dict.
 pub(crate) fn method(
     value: &Value,
     method: Method,
@@ -328,7 +329,7 @@ fn wrong_arguments(name: &str, arguments: &[Value]) -> Fault {
     format!("`{name}` does not take {} arguments", arguments.len()).into()
 }
 
-/// A function that every script has.
+/// Calls a function that every script has.
 pub(crate) fn builtin(function: Builtin, arguments: &[Value], meter: &Rc<Meter>) -> Outcome<Value> {
     let name = function.name();
     meter.spend(cost::FUNCTION)?;
@@ -416,7 +417,7 @@ fn number(function: &str, value: &Value) -> Outcome<f64> {
     value.number().ok_or_else(wrong)
 }
 
-/// A float without fraction as a whole number.
+/// A float without a fraction as a whole number.
 fn whole(value: f64) -> Outcome<Value> {
     const LARGEST: f64 = (1_i64 << 62) as f64;
     if value.abs() <= LARGEST {

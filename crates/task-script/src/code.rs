@@ -1,18 +1,18 @@
-//! A script as it is executed: a tree whose names are numbers.
+//! The executable form of a script: a tree with numbers instead of names.
 
-/// A name of the host's: its index in the [`Vocabulary`](crate::Vocabulary).
+/// A name of the host, as index in the [`Vocabulary`](crate::Vocabulary).
 pub type Name = u16;
 
 /// An expression.
 #[derive(Debug)]
 pub(crate) struct Expr {
     pub(crate) line: u32,
-    /// Of the expressions within each other; at most [`DEPTH`].
+    /// Nesting depth of its expressions; at most [`DEPTH`].
     pub(crate) depth: u16,
     pub(crate) op: Op,
 }
 
-/// Expressions within each other, so that executing them takes little stack.
+/// Largest nesting depth of expressions, so that their execution takes little stack.
 pub(crate) const DEPTH: u16 = 50;
 
 #[derive(Debug)]
@@ -49,7 +49,7 @@ pub(crate) enum Op {
     Method(Box<Expr>, Called, Vec<Expr>),
 }
 
-/// Operators of two operands that are both evaluated.
+/// Binary operators that evaluate both operands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Binary {
     Add,
@@ -69,7 +69,7 @@ pub(crate) enum Binary {
 }
 
 impl Binary {
-    /// As scripts write it.
+    /// The operator in the text of a script.
     pub(crate) fn symbol(self) -> &'static str {
         match self {
             Self::Add => "+",
@@ -97,7 +97,7 @@ pub(crate) enum Clause {
     If(Expr),
 }
 
-/// What a value is assigned to.
+/// The target of an assignment.
 #[derive(Debug)]
 pub(crate) enum Target {
     Local(usize),
@@ -117,7 +117,7 @@ pub(crate) struct Order {
     pub(crate) reverse: Option<Expr>,
 }
 
-/// What is wanted of the order.
+/// The requested part of the order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Which {
     First,
@@ -125,23 +125,22 @@ pub(crate) enum Which {
     All,
 }
 
-/// What an element is compared by.
+/// The key that orders elements.
 #[derive(Debug)]
 pub(crate) enum ElementKey {
     Function(usize),
-    /// `lambda`: where its argument goes, and the value.
+    /// `lambda`: the slot of its argument, and the value.
     Lambda(usize, Expr),
 }
 
-/// A method that is called, by its name: one of lists and dicts, one of the host's
-/// things, or both.
+/// The method of a call, by its name: one of lists and dicts, one of the host's objects, or both.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Called {
     pub(crate) container: Option<Method>,
     pub(crate) host: Option<Name>,
 }
 
-/// From a row per name: an enum and its names.
+/// Makes an enum and its names from one row per name.
 macro_rules! names {
     ($(#[$doc:meta])* $kind:ident { $($name:literal = $variant:ident,)* }) => {
         $(#[$doc])*
@@ -247,10 +246,10 @@ pub(crate) struct Function {
     pub(crate) name: String,
     pub(crate) line: u32,
     pub(crate) n_parameters: usize,
-    /// Slots of its frame, parameters first.
+    /// Number of slots of its frame, parameters first.
     pub(crate) n_locals: usize,
     pub(crate) body: Vec<Stmt>,
-    /// The keys of the dict with literal keys that it returns; none if it returns something
-    /// else, too.
+    /// The keys of the dict with literal keys that it returns; `None` if it also returns other
+    /// values.
     pub(crate) returned_keys: Option<Vec<String>>,
 }

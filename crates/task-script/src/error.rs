@@ -1,4 +1,4 @@
-//! What is wrong with a script, and where.
+//! Problems of scripts, with their place.
 
 /// A problem of a script.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -8,18 +8,18 @@ pub struct ScriptError {
     pub file: String,
     /// Line of its text, from 1.
     pub line: u32,
-    /// What is wrong there.
+    /// The problem.
     pub message: String,
 }
 
-/// Characters of a message that a script writes itself.
+/// Most characters of a message that a script writes itself.
 const MESSAGE_CHARS: usize = 200;
 
-/// A problem whose file, and at first whose line, is not known.
+/// A problem without its file and, at first, without its line.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fault(Box<(Option<u32>, String)>);
 
-/// A result, or what is wrong.
+/// A result, or a problem.
 pub(crate) type Outcome<T> = Result<T, Fault>;
 
 impl Fault {
@@ -28,7 +28,7 @@ impl Fault {
         Self(Box::new((Some(line), message.into())))
     }
 
-    /// The problem happened in this line, unless it is known to have happened elsewhere.
+    /// Sets the line of the problem, unless it has one already.
     pub(crate) fn at(mut self, line: u32) -> Self {
         self.0.0.get_or_insert(line);
         self
@@ -53,7 +53,7 @@ impl From<&str> for Fault {
     }
 }
 
-/// A text as far as messages show it.
+/// A text, shortened for messages.
 pub(crate) fn shortened(text: &str) -> String {
     text.chars().take(MESSAGE_CHARS).map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -13,21 +13,21 @@ use crate::sort_keys::Keys;
 use crate::value::Value;
 use crate::{Host, Program};
 
-/// Calls within each other.
+/// Largest nesting depth of calls.
 const CALLS: u32 = 16;
 
-/// What a call works with.
+/// The state of an execution.
 pub(crate) struct Machine<'a> {
     pub(crate) program: &'a Program,
     pub(crate) meter: &'a Rc<Meter>,
     /// Literals.
     pub(crate) texts: &'a [Value],
-    /// Constants; none before they are assigned.
+    /// Constants; `None` before their assignment.
     pub(crate) globals: &'a mut [Option<Value>],
     pub(crate) host: &'a mut dyn Host,
-    /// Variables of all calls that are open; none before they are assigned.
+    /// Variables of all open calls; `None` before their assignment.
     pub(crate) stack: &'a mut Vec<Option<Value>>,
-    /// Where those of the innermost call begin.
+    /// Index of the innermost call's first variable.
     pub(crate) base: usize,
     pub(crate) n_calls: u32,
 }
@@ -96,15 +96,15 @@ impl Machine<'_> {
         }
     }
 
-    /// A statement, iteration or call begins: it is work, and now and then the host says whether
-    /// to go on.
+    /// Begins a statement, iteration or call: counts its work, and regularly asks the host
+    /// whether to continue.
     #[inline]
     fn begin(&mut self) -> Result<(), String> {
         self.meter.work(1)?;
         if self.meter.is_question_due() { self.ask() } else { Ok(()) }
     }
 
-    /// Asks the host whether to go on.
+    /// Asks the host whether to continue.
     fn ask(&mut self) -> Result<(), String> {
         self.meter.ask_later();
         if self.host.goes_on() { Ok(()) } else { Err("was stopped".into()) }
@@ -436,7 +436,7 @@ impl Machine<'_> {
         best.map(|(_, value)| value).ok_or_else(|| "an empty list has no least or largest".into())
     }
 
-    /// Values in the order of their keys; equal ones keep theirs.
+    /// Values in the order of their keys; the sort is stable.
     fn sorted(&mut self, mut keyed: Vec<(Value, Value)>, is_reverse: bool) -> Outcome<Value> {
         let n_rounds = keyed.len().max(1).ilog2() as usize;
         self.meter.work(keyed.len() * n_rounds)?;

@@ -1,18 +1,18 @@
-//! What a dict finds its entries by.
+//! The keys of dicts.
 
 use std::rc::Rc;
 
 use crate::meter::Meter;
 use crate::value::{COMPARED_DEPTH, Object, Value};
 
-/// What a dict finds its entries by.
+/// The keys of dicts.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) enum Key {
     Nothing,
     Bool(bool),
-    /// Whole numbers, and floats that are.
+    /// A whole number, or a float with a whole value.
     Int(i64),
-    /// Bits of another float.
+    /// The bits of any other float.
     Float(u64),
     Text(String),
     Tuple(Vec<Key>),
@@ -20,7 +20,7 @@ pub(crate) enum Key {
 }
 
 impl Key {
-    /// The key that a value is.
+    /// Converts a value to a key.
     pub(crate) fn new(value: &Value) -> Result<Self, String> {
         Self::within(value, COMPARED_DEPTH)
     }
@@ -45,7 +45,7 @@ impl Key {
         })
     }
 
-    /// Bytes that it takes beside itself.
+    /// Bytes that it takes on the heap.
     pub(crate) fn bytes(&self) -> usize {
         match self {
             Self::Text(text) => text.len(),
@@ -54,7 +54,7 @@ impl Key {
         }
     }
 
-    /// The value that the key stands for.
+    /// Converts the key back to a value.
     pub(crate) fn value(&self, meter: &Rc<Meter>) -> Result<Value, String> {
         Ok(match self {
             Self::Nothing => Value::Nothing,
@@ -73,7 +73,7 @@ impl Key {
 
 /// A float as a whole number, if it is one.
 fn whole(value: f64) -> Option<i64> {
-    /// Up to there, every whole number is a float.
+    /// Up to this number, every whole number is exactly a float.
     const EXACT: f64 = (1_i64 << 53) as f64;
     (value.abs() <= EXACT && value.fract() == 0.0).then_some(value as i64)
 }

@@ -9,7 +9,7 @@ pub(crate) struct Token<'a> {
     pub(crate) line: u32,
 }
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Kind<'a> {
     /// A name or a keyword.
@@ -18,11 +18,11 @@ pub(crate) enum Kind<'a> {
     Float(f64),
     Text(String),
     Operator(&'static str),
-    /// End of a line that is not within brackets.
+    /// End of a line outside brackets.
     Newline,
     /// The next line is indented further.
     Indent,
-    /// The next line is indented less, by one block.
+    /// The next line closes one block.
     Dedent,
     End,
 }
@@ -33,7 +33,7 @@ const OPERATORS: [&str; 30] = [
     "{", "}", ",", ":", ".", "=", "+", "-", "*", "/", "%", "<", ">", ";",
 ];
 
-/// Blocks within each other.
+/// Largest nesting depth of blocks.
 const BLOCKS: usize = 20;
 
 /// All tokens of a text; the last one is [`Kind::End`].
@@ -48,7 +48,7 @@ struct Lexer<'a> {
     /// Place in the text, bytes.
     at: usize,
     line: u32,
-    /// Open brackets, within which line ends mean nothing.
+    /// Number of open brackets; line ends within brackets are ignored.
     brackets: usize,
     /// Indentation of the open blocks, spaces.
     indents: Vec<usize>,

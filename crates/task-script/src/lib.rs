@@ -1,10 +1,9 @@
-//! The language in which experiment files say what a swarm has to do: a subset of
+//! The language of tasks in experiment files: a subset of
 //! [Starlark](https://github.com/bazelbuild/starlark), which is a subset of Python.
 //!
-//! A script is a pure function of what its host shows it. It has no I/O, no clock and no
-//! loop without end; what it computes has the same bits on every machine; and what a call
-//! may do and keep is [limited](Limits). Nothing in a text makes this crate panic, hang or
-//! take more memory than that.
+//! A script is a pure function of the data that its host shows it. It has no I/O, no clock and no
+//! endless loop, and it computes the same bits on every machine. The work and memory of a call
+//! are [limited](Limits). No text makes this crate panic, hang or exceed these limits.
 //!
 //! ```
 //! use task_script::{Host, Limits, Meter, Name, Object, Program, Value, Vocabulary};
@@ -40,9 +39,9 @@
 //! # Ok::<(), task_script::ScriptError>(())
 //! ```
 //!
-//! `lexer` and `parser` make `code` of a text, in which names are numbers; `eval` executes
-//! it; `value` has what it works with, `builtins` what it can do with it, and `meter`
-//! counts what it uses.
+//! `lexer` and `parser` turn a text into `code`, in which names are numbers, and `eval` executes
+//! the code. `value` has the values, `builtins` their functions and operators, and `meter` counts
+//! work and memory.
 
 mod builtins;
 mod code;
@@ -65,17 +64,17 @@ pub use value::{Dict, List, Object, Text, Value};
 use code::{Function, Stmt};
 use eval::Machine;
 
-/// Bytes of a script.
+/// Largest size of a script, bytes.
 pub const TEXT_BYTES: usize = experiment_file::limits::SCRIPT_BYTES;
 
-/// The names that the host's things have.
+/// The names of the host's objects.
 #[derive(Debug, Clone, Copy)]
 pub struct Vocabulary {
     /// Attributes and methods. A [`Name`] is an index of this list.
     pub names: &'static [&'static str],
 }
 
-/// What a script sees and changes.
+/// The objects that a script can read and change.
 pub trait Host {
     /// The value of `object.name`.
     fn get(&mut self, object: Object, name: Name, meter: &Rc<Meter>) -> Result<Value, String>;
@@ -83,14 +82,15 @@ pub trait Host {
     /// `object.name = value`.
     fn set(&mut self, object: Object, name: Name, value: Value) -> Result<(), String>;
 
-    /// Whether to go on; asked every few milliseconds of a call, which fails if not. The answer may
-    /// come from a clock or from another thread, so a call that was stopped has no result.
+    /// Whether to continue; called every few milliseconds of a call, which fails if the answer is
+    /// false. The answer may come from a clock or from another thread, so a stopped call has no
+    /// result.
     fn goes_on(&mut self) -> bool {
         true
     }
 
-    /// `object.name(arguments)`. What takes longer with more things is to be told to the
-    /// meter as work.
+    /// `object.name(arguments)`. A method whose duration grows with the number of objects has to
+    /// report its work to the meter.
     fn call(
         &mut self,
         object: Object,
@@ -100,12 +100,12 @@ pub trait Host {
     ) -> Result<Value, String>;
 }
 
-/// A script that was compiled.
+/// A compiled script.
 #[derive(Debug)]
 pub struct Program {
     file: String,
     functions: Vec<Function>,
-    /// What stands outside functions.
+    /// The statements outside functions.
     start: Vec<Stmt>,
     n_start_locals: usize,
     n_globals: usize,
@@ -118,8 +118,11 @@ pub struct Program {
 pub struct FunctionId(usize);
 
 impl Program {
-    /// Compiles a text; `file` names it in messages. The error has everything that can be
-    /// found without executing it.
+    /// Compiles a text of at most [`TEXT_BYTES`] bytes; `file` names it in messages.
+    ///
+    /// # Errors
+    ///
+    /// All problems that can be found without execution, never empty.
     pub fn compile(
         file: &str,
         text: &str,
@@ -151,25 +154,29 @@ impl Program {
         self.functions.iter().map(|function| function.name.as_str())
     }
 
-    /// Line of a function, and how many arguments it takes.
+    /// Line of a function, from 1, and its number of parameters.
     pub fn signature(&self, function: FunctionId) -> (u32, usize) {
         let function = &self.functions[function.0];
         (function.line, function.n_parameters)
     }
 
-    /// The keys of the dicts with literal keys that a function returns; none if it returns
-    /// something else, too.
+    /// The keys of the dicts with literal keys that a function returns; `None` if it also returns
+    /// other values.
     pub fn returned_keys(&self, function: FunctionId) -> Option<&[String]> {
         self.functions[function.0].returned_keys.as_deref()
     }
 
-    /// The problem of a function whose value the host has no use for.
+    /// A problem of a function whose result the host cannot use.
     pub fn problem(&self, function: FunctionId, message: String) -> ScriptError {
         let Function { name, line, .. } = &self.functions[function.0];
         ScriptError { file: self.file.clone(), line: *line, message: format!("`{name}` {message}") }
     }
 
-    /// Executes what stands outside functions. `limits` hold for every call.
+    /// Executes the statements outside functions. `limits` hold for every call.
+    ///
+    /// # Errors
+    ///
+    /// If a statement fails, exceeds the limits, or is stopped by the host.
     pub fn start(&self, limits: Limits, host: &mut dyn Host) -> Result<Script, ScriptError> {
         let meter = Meter::new(limits);
         let texts = self.texts.iter().map(|text| Value::text(text, &meter));
@@ -184,7 +191,7 @@ impl Program {
     }
 }
 
-/// A script that is being executed: its constants, and what it uses.
+/// A running script: its constants, and the work and memory that it uses.
 #[derive(Debug)]
 pub struct Script {
     meter: Rc<Meter>,
@@ -194,12 +201,16 @@ pub struct Script {
 }
 
 impl Script {
-    /// What it uses; for values that the host makes.
+    /// Its meter, for values that the host makes.
     pub fn meter(&self) -> &Rc<Meter> {
         &self.meter
     }
 
-    /// Calls a function of its program.
+    /// Calls a function of its program, with fresh limits of work.
+    ///
+    /// # Errors
+    ///
+    /// If a statement fails, exceeds the limits, or is stopped by the host.
     pub fn call(
         &mut self,
         program: &Program,
@@ -211,8 +222,11 @@ impl Script {
         self.call_again(program, function, arguments, host)
     }
 
-    /// As [`call`](Self::call), with the work that the calls since the last
-    /// [`refill`](Self::refill) have left.
+    /// As [`call`](Self::call), with the remaining work since the last [`refill`](Self::refill).
+    ///
+    /// # Errors
+    ///
+    /// As [`call`](Self::call).
     pub fn call_again(
         &mut self,
         program: &Program,
@@ -226,7 +240,8 @@ impl Script {
         called.map_err(|fault| fault.at(function.line).into_error(&program.file))
     }
 
-    /// Several calls follow that share what one may do.
+    /// Renews the work for a group of [`call_again`](Self::call_again), which share the limit of
+    /// one call.
     pub fn refill(&self) {
         self.meter.refill();
     }

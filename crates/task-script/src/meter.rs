@@ -1,52 +1,52 @@
-//! What a script may use: work per call, and memory.
+//! Counts and limits the work per call and the memory of a script.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use crate::value::Holder;
 
-/// What operations cost, in units of some three nanoseconds. Whoever reads all of a text,
-/// list or dict pays for its length; `value` and `key` give access to them only so.
+/// The costs of operations, in units of about three nanoseconds. Reading all of a text, list or
+/// dict costs its length; `value` and `key` give no other access.
 pub(crate) mod cost {
-    /// A statement, an iteration, a call, or an element that a function goes through.
+    /// A statement, an iteration, a call, or an element that a function visits.
     pub const STATEMENT: u64 = 64;
     /// A step in the evaluation of an expression.
     pub const OPERATION: usize = 2;
-    /// A list, dict or text that is made.
+    /// Making a list, dict or text.
     pub const CONTAINER: usize = 16;
-    /// An entry of a dict that is found by its key.
+    /// Finding an entry of a dict by its key.
     pub const ENTRY: usize = 16;
     /// A function such as the sine.
     pub const FUNCTION: usize = 32;
-    /// Bytes of texts that are copied, compared or hashed for one unit.
+    /// Bytes of text to copy, compare or hash per unit.
     pub const BYTES: usize = 8;
 }
 
-/// Units of work after which the host is asked whether to go on: a few milliseconds.
+/// Units of work between two questions to the host: a few milliseconds.
 const PATIENCE: u64 = 1 << 20;
 
-/// What a script may use.
+/// The limits of a script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Work per call, in statements: a statement, an iteration, a call and an element that a
-    /// function goes through count as one; operations within a statement, and the texts that
-    /// they copy, compare or hash, by what they take.
+    /// Work per call, in statements. A statement, an iteration, a call, and an element that a
+    /// function visits count as one. Operations within a statement, and the texts that they copy,
+    /// compare or hash, count by their duration.
     pub work: u64,
     /// Bytes that its lists, dicts and texts may take at any time.
     pub memory: usize,
 }
 
-/// How much of it is used.
+/// The work and memory used so far.
 #[derive(Debug)]
 pub struct Meter {
     limits: Limits,
-    /// Work that the call may still do, in units.
+    /// Remaining work of the call, in units.
     work_left: Cell<u64>,
-    /// The host is asked whether to go on when so little is left.
+    /// The host is asked again when only this much work is left.
     next_question: Cell<u64>,
     memory: Cell<usize>,
-    /// Those that may be part of a cycle, and how many there were when it was last seen who
-    /// is still in use.
+    /// Lists and dicts that may be part of a cycle, and their number at the last removal of
+    /// unused ones.
     holders: RefCell<(Vec<Holder>, usize)>,
 }
 
@@ -63,19 +63,23 @@ impl Meter {
         Rc::new(meter)
     }
 
-    /// A call begins.
+    /// Begins a call, with full work.
     pub(crate) fn refill(&self) {
         self.work_left.set(self.limits.work.saturating_mul(cost::STATEMENT));
         self.ask_later();
     }
 
-    /// Takes the work of so many statements; fails if there is not so much left.
+    /// Takes the work of `statements` statements.
+    ///
+    /// # Errors
+    ///
+    /// If too little work is left.
     #[inline]
     pub fn work(&self, statements: usize) -> Result<(), String> {
         self.take_units((statements as u64).saturating_mul(cost::STATEMENT))
     }
 
-    /// Takes units of work, of which a statement has [`cost::STATEMENT`].
+    /// Takes units of work; a statement has [`cost::STATEMENT`].
     #[inline]
     pub(crate) fn spend(&self, units: usize) -> Result<(), String> {
         self.take_units(units as u64)
@@ -107,26 +111,26 @@ impl Meter {
         )
     }
 
-    /// Whether so much work has been done since the host was asked that it is asked again.
+    /// Whether it is time to ask the host again.
     #[inline]
     pub(crate) fn is_question_due(&self) -> bool {
         self.work_left.get() <= self.next_question.get()
     }
 
-    /// The host was asked.
+    /// Sets the next question after one to the host.
     pub(crate) fn ask_later(&self) {
-        // The last question of a call is the one at zero, which never comes.
+        // A call ends before the question at zero work.
         self.next_question.set(self.work_left.get().saturating_sub(PATIENCE));
     }
 
-    /// Fails if there is no room for so many bytes, before anything is made that takes them.
+    /// Fails if there is no room for this many bytes, before they are allocated.
     pub(crate) fn check_room(&self, bytes: usize) -> Result<(), String> {
         self.take(bytes)?;
         self.release(bytes);
         Ok(())
     }
 
-    /// Takes memory; fails if there is not so much left.
+    /// Takes memory; fails if too little is left.
     pub(crate) fn take(&self, bytes: usize) -> Result<(), String> {
         let memory = self.memory.get().saturating_add(bytes);
         if memory > self.limits.memory {
@@ -149,7 +153,7 @@ impl Meter {
         self.memory.get()
     }
 
-    /// Notes what may hold itself, so that it can be taken apart in the end.
+    /// Notes a list or dict that may contain itself, to take it apart in the end.
     pub(crate) fn note(&self, holder: Holder) {
         let (holders, n_used) = &mut *self.holders.borrow_mut();
         holders.push(holder);
@@ -159,7 +163,7 @@ impl Meter {
         }
     }
 
-    /// Takes apart what may hold itself.
+    /// Takes lists and dicts apart that may contain themselves.
     pub(crate) fn take_apart(&self) {
         let (holders, _) = std::mem::take(&mut *self.holders.borrow_mut());
         for holder in holders {

@@ -1,4 +1,4 @@
-//! From tokens to code: expressions are in `expression.rs`, statements and names here.
+//! Turns tokens into code: statements and names here, expressions in `expression.rs`.
 
 mod containers;
 mod depth;
@@ -14,7 +14,7 @@ use crate::lexer::{Kind, Token, tokens};
 use crate::{Program, Vocabulary};
 use scope::{Scope, Variable};
 
-/// Words that Python has and scripts have not, and what to write instead.
+/// Words of Python that scripts lack, with their replacement.
 const REFUSED: [(&str, &str); 14] = [
     ("while", "there is no `while`; a `for` over `range(n)` with `break` does the same"),
     ("import", "a script imports nothing; `math` is there already"),
@@ -37,11 +37,10 @@ const KEYWORDS: [&str; 18] = [
     "pass", "return", "True", "False", "None", "math",
 ];
 
-/// Problems that are reported of a script.
+/// Most problems to report per script.
 const PROBLEMS: usize = 20;
 
-/// Compiles a text. Names that mean nothing are all reported; of what is no syntax, only
-/// the first.
+/// Compiles a text. Reports all unknown names, but only the first syntax error.
 pub(crate) fn parse(text: &str, vocabulary: &Vocabulary) -> Result<Program, Vec<Fault>> {
     let tokens = tokens(text).map_err(|fault| vec![fault])?;
     let mut parser = Parser::new(&tokens, vocabulary);
@@ -65,9 +64,9 @@ struct Parser<'a> {
     tokens: &'a [Token<'a>],
     at: usize,
     vocabulary: &'a Vocabulary,
-    /// Names of functions, of the whole text, and how many parameters each has.
+    /// Names of all functions of the text, with their numbers of parameters.
     signatures: Vec<(&'a str, usize)>,
-    /// Names of constants, of the whole text.
+    /// Names of all constants of the text.
     globals: Vec<&'a str>,
     functions: Vec<Function>,
     start: Vec<Stmt>,
@@ -76,7 +75,7 @@ struct Parser<'a> {
     /// Whether the parser is in a function.
     in_function: bool,
     n_loops: usize,
-    /// Expressions that are open.
+    /// Number of open expressions.
     depth: u16,
     problems: Vec<Fault>,
 }
@@ -114,15 +113,15 @@ impl<'a> Parser<'a> {
         Fault::new(self.line(), message)
     }
 
-    /// Notes a problem after which reading goes on.
+    /// Notes a problem, and continues reading.
     fn problem(&mut self, line: u32, message: impl Into<String>) {
         if self.problems.len() < PROBLEMS {
             self.problems.push(Fault::new(line, message));
         }
     }
 
-    /// Notes a name that means nothing, with what it may have been. Looking for that compares it
-    /// with all names there are, so it is done for those that are reported only.
+    /// Notes an unknown name, with a suggestion. A suggestion compares the name with all known
+    /// ones, so only reported names get one.
     fn unknown(&mut self, line: u32, what: &str, name: &str, known: impl Fn(&Self) -> Vec<&str>) {
         if self.problems.len() < PROBLEMS {
             let suggestion = suggestion(name, &known(self));
@@ -151,7 +150,7 @@ impl<'a> Parser<'a> {
         Err(self.fault(format!("expected `{operator}`, found {}", self.found())))
     }
 
-    /// What is next, in words.
+    /// Describes the next token.
     fn found(&self) -> String {
         match self.kind() {
             Kind::Name(name) => format!("`{}`", shortened(name)),
@@ -191,7 +190,7 @@ impl<'a> Parser<'a> {
             for statement in statement {
                 match statement.kind {
                     StmtKind::Assign(..) => self.start.push(statement),
-                    // A text that explains.
+                    // A docstring.
                     StmtKind::Expr(Expr { op: Op::Text(_), .. }) | StmtKind::Pass => {}
                     _ => {
                         let message = "outside functions, there are only constants, `NAME = value`";
@@ -239,7 +238,7 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// Reports names that are read and mean nothing.
+    /// Reports unknown names that are read.
     fn report_unknown(&mut self, scope: &Scope<'a>) {
         for (name, line) in scope.never_assigned() {
             match REFUSED.iter().find(|(word, _)| *word == name) {
@@ -259,7 +258,7 @@ impl<'a> Parser<'a> {
         own.chain(functions).chain(builtins).chain(["True", "False", "None", "math"]).collect()
     }
 
-    /// `:` and what is to be done, in this line or in an indented block.
+    /// `:` and the statements after it, in this line or in an indented block.
     fn block(&mut self) -> Outcome<Vec<Stmt>> {
         self.expect(":")?;
         if *self.kind() != Kind::Newline {
@@ -354,7 +353,7 @@ impl<'a> Parser<'a> {
             }));
         }
         let start = self.at;
-        // The left side of an assignment declares names, which reading it does not.
+        // The left side of an assignment declares names; reading a name does not.
         if self.is_assignment() {
             let target = self.targets()?;
             self.expect("=")?;
@@ -385,7 +384,7 @@ impl<'a> Parser<'a> {
         Ok(StmtKind::Expr(value))
     }
 
-    /// Whether there is a `=` in this line that is in no brackets.
+    /// Whether this line has a `=` outside brackets.
     fn is_assignment(&self) -> bool {
         let mut n_brackets = 0;
         for token in &self.tokens[self.at..] {
@@ -401,7 +400,7 @@ impl<'a> Parser<'a> {
         false
     }
 
-    /// One target, or several that a value is unpacked to.
+    /// One target, or several, to which a value is unpacked.
     fn targets(&mut self) -> Outcome<Target> {
         let first = self.target()?;
         if *self.kind() != Kind::Operator(",") {
@@ -443,7 +442,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A name gets a value.
+    /// Declares a name that gets a value.
     fn declare(&mut self, name: &'a str, line: u32) -> Target {
         let is_shared = self.signatures.iter().any(|(function, _)| *function == name)
             || (self.in_function && self.globals.contains(&name));
@@ -475,11 +474,11 @@ impl<'a> Parser<'a> {
             self.problem(line, format!("`{name}` is a function: call it, `{name}(...)`"));
             return Op::Nothing;
         }
-        // It may be assigned further down, in a loop.
+        // The assignment may follow further down, in a loop.
         Op::Local(self.scope.expect(name, line))
     }
 
-    /// An expression begins within another one.
+    /// Begins an expression within another one.
     fn deeper(&mut self) -> Outcome<()> {
         self.depth += 1;
         if self.depth > crate::code::DEPTH {

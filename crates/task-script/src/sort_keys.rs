@@ -1,4 +1,4 @@
-//! The order in which `sorted` brings values.
+//! The order of `sorted`.
 
 use std::cmp::Ordering;
 
@@ -6,7 +6,7 @@ use crate::builtins;
 use crate::error::Outcome;
 use crate::value::Value;
 
-/// Keys that have a total order, as sorting needs it: all are numbers, or all are texts.
+/// Keys with a total order, which sorting needs: all are numbers, or all are texts.
 pub struct Keys {
     are_texts: bool,
     /// Bytes of all texts.
@@ -14,7 +14,11 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// The keys of what is to be sorted; an error if they have no order.
+    /// The keys of values to sort.
+    ///
+    /// # Errors
+    ///
+    /// If the keys have no order.
     pub fn from_keyed(keyed: &[(Value, Value)]) -> Outcome<Self> {
         let Some((first, _)) = keyed.first() else {
             return Ok(Self { are_texts: false, n_bytes: 0 });
@@ -33,14 +37,14 @@ impl Keys {
         Ok(Self { are_texts, n_bytes })
     }
 
-    /// How two of them are ordered.
+    /// The order of two keys.
     pub fn order(&self, a: &Value, b: &Value) -> Ordering {
         if self.are_texts {
             return a.as_text().cmp(&b.as_text());
         }
         let number = |value: &Value| value.number().unwrap_or_default();
-        // As floats, and those that are one float as whole numbers: whole numbers beyond 2^53 have
-        // floats between them.
+        // Compares as floats, and equal floats as whole numbers, because beyond 2^53 several
+        // whole numbers become the same float.
         let exact = |value: &Value| match value {
             Value::Int(value) => i128::from(*value),
             other => number(other) as i128,

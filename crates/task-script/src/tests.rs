@@ -1,8 +1,8 @@
-//! What scripts compute, and what they are refused.
+//! The results of scripts, and the errors of wrong ones.
 
 use super::*;
 
-/// Nothing: scripts here need no world.
+/// A host without a world, which these scripts do not need.
 struct Nowhere;
 
 impl Host for Nowhere {
@@ -27,7 +27,7 @@ fn compile(text: &str) -> Result<Program, Vec<ScriptError>> {
     Program::compile("t.star", text, &VOCABULARY)
 }
 
-/// What the last function of a text returns, and the memory that is still used then.
+/// The result of the last function of a text, and the memory in use afterwards.
 fn run_measured(text: &str) -> (Result<Value, ScriptError>, usize) {
     let program = compile(text).unwrap_or_else(|errors| panic!("{text}\n{}", errors[0]));
     let function = FunctionId(program.functions.len() - 1);
@@ -51,7 +51,7 @@ fn run(text: &str) -> Result<Value, ScriptError> {
     run_measured(text).0
 }
 
-/// Whether a condition holds after some statements; both are Python, too.
+/// Whether a condition holds after some statements; both are also valid Python.
 fn holds(statements: &str, condition: &str) -> bool {
     let statements = statements.replace('\n', "\n    ");
     let text = format!("def f(x):\n    {statements}\n    return {condition}");
@@ -198,7 +198,7 @@ fn what_goes_wrong_is_said_with_its_line() {
 
 #[test]
 fn what_has_no_order_is_not_sorted_and_large_numbers_are() {
-    // Long enough for the sort to see that an order contradicts itself.
+    // Long enough for the sort to notice an inconsistent order.
     let nan =
         "n = math.inf - math.inf\n    l = [n if i % 7 == 3 else (i * 31) % 50 for i in range(90)]";
     for (l, expected) in [
@@ -210,7 +210,7 @@ fn what_has_no_order_is_not_sorted_and_large_numbers_are() {
         let error = run(&format!("def f(x):\n    {l}\n    return sorted(l)")).unwrap_err();
         assert!(error.message.contains(expected), "{l}: {error}");
     }
-    // Neighbours as whole numbers, one and the same as floats.
+    // Different whole numbers that are the same float.
     let large =
         "b = 9007199254740992\nl = [b + i % 3 if i % 2 else (b + i % 3) * 1.0 for i in range(90)]";
     assert!(holds(large, "sorted(l)[0] == b and sorted([2, 1.5, 1]) == [1, 1.5, 2]"));

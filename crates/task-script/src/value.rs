@@ -11,13 +11,13 @@ use crate::error::Outcome;
 use crate::key::Key;
 use crate::meter::{Meter, cost};
 
-/// Bytes that an element of a list takes, at most.
+/// Most bytes of an element of a list.
 pub(crate) const ELEMENT: usize = 2 * size_of::<Value>();
-/// Bytes that an entry of a dict takes, at most.
+/// Most bytes of an entry of a dict.
 const ENTRY: usize = 2 * (size_of::<(Key, Value)>() + 16);
-/// Bytes that a list, dict or text takes without its content, at most.
+/// Most bytes of a list, dict or text without its content.
 const OVERHEAD: usize = 160;
-/// Lists within each other that are compared.
+/// Largest nesting depth of lists to compare.
 pub(crate) const COMPARED_DEPTH: usize = 16;
 
 /// A value. Lists and dicts are shared, as in Python.
@@ -35,18 +35,18 @@ pub enum Value {
     Text(Rc<Text>),
     /// A list or a tuple.
     List(Rc<List>),
-    /// A dict, which keeps the order in which its keys came.
+    /// A dict, which keeps the order of insertion.
     Dict(Rc<Dict>),
-    /// A thing of the host's.
+    /// An object of the host.
     Object(Object),
 }
 
-/// A thing of the host's.
+/// An object of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Object {
-    /// What kind of thing it is, an index of the [vocabulary](crate::Vocabulary)'s.
+    /// Its kind, an index of the [vocabulary](crate::Vocabulary).
     pub kind: u8,
-    /// Which one.
+    /// Its number among the objects of its kind.
     pub index: u32,
 }
 
@@ -73,13 +73,13 @@ pub struct Dict {
 
 #[derive(Clone, Copy, Default)]
 struct State {
-    /// Cannot be changed any more.
+    /// Whether it is immutable from now on.
     is_frozen: bool,
-    /// May be part of a cycle.
+    /// Whether the meter knows it as possible part of a cycle.
     is_noted: bool,
 }
 
-/// A list or dict that may hold itself.
+/// A list or dict that may contain itself.
 #[derive(Debug)]
 pub(crate) enum Holder {
     List(Weak<List>),
@@ -148,7 +148,11 @@ impl List {
         items
     }
 
-    /// A copy of its elements, which is the work of as many statements.
+    /// A copy of its elements, which costs the work of as many statements.
+    ///
+    /// # Errors
+    ///
+    /// If too little work is left.
     pub fn items(&self) -> Result<Vec<Value>, String> {
         self.meter.work(self.len())?;
         Ok(self.items.borrow().clone())
@@ -159,12 +163,12 @@ impl List {
         self.items.borrow().len()
     }
 
-    /// Whether it has none.
+    /// Whether it has no elements.
     pub fn is_empty(&self) -> bool {
         self.items.borrow().is_empty()
     }
 
-    /// An element.
+    /// The element at `index`; `None` if it does not exist.
     pub fn get(&self, index: usize) -> Option<Value> {
         self.items.borrow().get(index).cloned()
     }
@@ -183,7 +187,7 @@ impl List {
         }
     }
 
-    /// Puts an element in front of number `index`.
+    /// Inserts an element before number `index`.
     pub(crate) fn insert(self: &Rc<Self>, index: usize, value: Value) -> Outcome<()> {
         self.check_mutable()?;
         self.meter.take(ELEMENT)?;
@@ -203,7 +207,7 @@ impl List {
         Ok(())
     }
 
-    /// Takes an element out, which must exist.
+    /// Removes an element, which must exist.
     pub(crate) fn remove(&self, index: usize) -> Outcome<Value> {
         self.check_mutable()?;
         let value = self.items.borrow_mut().remove(index);
@@ -237,7 +241,7 @@ impl Dict {
         self.entries.borrow().len()
     }
 
-    /// The value of a text as key.
+    /// The value of a key that is a text.
     pub fn get_text(&self, key: &str) -> Option<Value> {
         self.entries.borrow().get(&Key::Text(key.to_owned())).cloned()
     }
@@ -247,7 +251,7 @@ impl Dict {
         Ok(self.entries.borrow().get(key).cloned())
     }
 
-    /// The work of finding a key.
+    /// Takes the work of finding a key.
     fn pay_for(&self, key: &Key) -> Result<(), String> {
         self.meter.spend(cost::ENTRY + key.bytes() / cost::BYTES)
     }
@@ -270,7 +274,7 @@ impl Dict {
         Ok(())
     }
 
-    /// Those behind it move up.
+    /// Removes an entry; later ones move up.
     pub(crate) fn remove(&self, key: &Key) -> Outcome<Option<Value>> {
         self.check_mutable()?;
         self.meter.work(self.len() / 8)?;
@@ -288,7 +292,7 @@ impl Dict {
         Ok(())
     }
 
-    /// Copies of its keys, which is the work of as many statements.
+    /// Copies of its keys, which cost the work of as many statements.
     pub(crate) fn keys(&self) -> Result<Vec<Key>, String> {
         self.meter.work(self.len())?;
         let entries = self.entries.borrow();
@@ -305,7 +309,11 @@ impl Dict {
 }
 
 impl Value {
-    /// A text.
+    /// Makes a text.
+    ///
+    /// # Errors
+    ///
+    /// If too little memory or work is left.
     pub fn text(text: &str, meter: &Rc<Meter>) -> Result<Self, String> {
         meter.spend(cost::CONTAINER)?;
         meter.read(text.len())?;
@@ -313,12 +321,20 @@ impl Value {
         Ok(Self::Text(Rc::new(Text { text: text.to_owned(), meter: Rc::clone(meter) })))
     }
 
-    /// A list.
+    /// Makes a list.
+    ///
+    /// # Errors
+    ///
+    /// If too little memory or work is left.
     pub fn list(items: Vec<Self>, meter: &Rc<Meter>) -> Result<Self, String> {
         Self::sequence(items, false, meter)
     }
 
-    /// A tuple.
+    /// Makes a tuple.
+    ///
+    /// # Errors
+    ///
+    /// If too little memory or work is left.
     pub fn tuple(items: Vec<Self>, meter: &Rc<Meter>) -> Result<Self, String> {
         Self::sequence(items, true, meter)
     }
@@ -330,7 +346,11 @@ impl Value {
         Ok(Self::List(Rc::new(List { items, is_tuple, state: Cell::default(), meter })))
     }
 
-    /// An empty dict.
+    /// Makes an empty dict.
+    ///
+    /// # Errors
+    ///
+    /// If too little memory or work is left.
     pub fn dict(meter: &Rc<Meter>) -> Result<Self, String> {
         meter.spend(cost::CONTAINER)?;
         meter.take(OVERHEAD)?;
@@ -338,7 +358,7 @@ impl Value {
         Ok(Self::Dict(Rc::new(Dict { entries, state: Cell::default(), meter })))
     }
 
-    /// The number, if it is one.
+    /// The value as a float, if it is a number.
     #[inline]
     pub fn number(&self) -> Option<f64> {
         match self {
@@ -348,20 +368,21 @@ impl Value {
         }
     }
 
-    /// The text, if it is one. Comparing it with few short names is no work; what reads all of a
-    /// text, such as a comparison, pays for it.
+    /// The text, if the value is one. Comparing it with a few short names is free; code that
+    /// reads the whole text, such as a comparison, has to pay for it.
     pub fn as_text(&self) -> Option<&str> {
         if let Self::Text(text) = self { Some(&text.text) } else { None }
     }
 
-    /// The text, if it is one, and the work of reading it once.
+    /// The text, if the value is one; takes the work of reading it once.
     pub(crate) fn read_text(&self) -> Result<Option<&str>, String> {
         let Self::Text(text) = self else { return Ok(None) };
         text.meter.read(text.text.len())?;
         Ok(Some(&text.text))
     }
 
-    /// Whether a condition holds: all but `None`, `False`, zero and what is empty.
+    /// Whether it counts as true in a condition: all values except `None`, `False`, zero and
+    /// empty ones.
     pub fn is_true(&self) -> bool {
         match self {
             Self::Nothing => false,
@@ -375,7 +396,7 @@ impl Value {
         }
     }
 
-    /// What kind of value it is, for messages.
+    /// Its kind, for messages.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Nothing => "None",
@@ -394,7 +415,7 @@ impl Value {
         matches!(self, Self::List(_) | Self::Dict(_))
     }
 
-    /// Lists and dicts within the value cannot be changed any more.
+    /// Makes all lists and dicts within the value immutable.
     pub fn freeze(&self) {
         let mut pending = vec![self.clone()];
         while let Some(value) = pending.pop() {
@@ -407,7 +428,7 @@ impl Value {
                 continue;
             }
             state.set(State { is_frozen: true, ..state.get() });
-            // Once for each list or dict, so it is work that making them has paid for.
+            // Happens once for each list or dict, so the work of making them covers it.
             match &value {
                 Self::List(list) => pending.extend(list.items.borrow().iter().cloned()),
                 Self::Dict(dict) => pending.extend(dict.entries.borrow().values().cloned()),
@@ -464,7 +485,7 @@ impl Value {
 }
 
 impl fmt::Debug for Value {
-    /// Its kind and, if it is simple, the value; what is nested is not shown.
+    /// Its kind and, if it is simple, the value, but no nested values.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Bool(value) => write!(f, "{value}"),

@@ -1,7 +1,7 @@
-//! Scripts that are made to cost as much as they can per statement: each ends within its budget,
-//! whatever it does, and soon after it is told to.
+//! Scripts with the most expensive statements: each ends within its budget, and soon after the
+//! host stops it.
 //!
-//! `SWARM_TEST_SCRIPTS` says how many.
+//! `SWARM_TEST_SCRIPTS` sets their number.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{
@@ -14,14 +14,13 @@ use std::{
 
 use task_script::{Host, Limits, Meter, Name, Object, Program, ScriptError, Value, Vocabulary};
 
-/// A seventieth of the work that scripts of experiments have, and the memory of those with
-/// many robots.
+/// A seventieth of the work of scripts in experiments, and the memory of those with many robots.
 const LIMITS: Limits = Limits { work: 40_000, memory: 1 << 20 };
-/// Longest that a script may take on a machine with much other work; it is a few milliseconds
-/// of work. One whose work is not counted takes minutes.
+/// Longest time of a script on a busy machine. The work takes a few milliseconds; a script with
+/// uncounted work would take minutes.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// No world; says so often that the script may go on.
+/// A host without a world; it lets the script continue this many times.
 struct Nowhere(Cell<u32>);
 
 impl Host for Nowhere {
@@ -51,7 +50,7 @@ fn run(text: &str, limits: Limits, mut host: Nowhere) -> Result<(), ScriptError>
     script.call(&program, function, &[], &mut host).map(drop)
 }
 
-/// Long texts, lists and dicts, within the memory that a script has.
+/// Long texts, lists and dicts, within the memory of a script.
 const VALUES: &str = "
     t = 'abcdefgh'
     for i in range(LENGTH): t = t + t
@@ -71,7 +70,7 @@ const VALUES: &str = "
         q = (q, q)
 ";
 
-/// Expressions whose cost is not that of a statement.
+/// Expressions that cost more than a statement.
 const EXPRESSIONS: [&str; 46] = [
     "u < v",
     "u >= v",
@@ -121,7 +120,7 @@ const EXPRESSIONS: [&str; 46] = [
     "deep(12)",
 ];
 
-/// Functions with many variables, and with calls within each other.
+/// Functions with many variables, and with nested calls.
 fn functions() -> String {
     let variables: Vec<String> = (0..700).map(|n| format!("a{n}=0")).collect();
     let variables = variables.join("; ");
@@ -144,15 +143,16 @@ impl Draw {
     }
 }
 
-/// A script that does one expensive thing as often as its text has room for, in each statement.
+/// A script that repeats one expensive expression in each statement, as often as its text has
+/// room for.
 fn extreme(expression: &str, functions: &str) -> String {
     let values = VALUES.replace("LENGTH", "13").replace("COUNT", "800");
     let line = vec![expression; 18_000 / (expression.len() + 2)].join(", ");
     format!("{functions}def main():{values}    for i in range(30000):\n        x = [{line}]\n")
 }
 
-/// A script that does a few expensive things very often: in one statement, in a comprehension, or
-/// in a sort.
+/// A script that evaluates a few expensive expressions very often: in one statement, in a
+/// comprehension, or in a sort.
 fn expensive(draw: &mut Draw, functions: &str) -> String {
     let values = VALUES
         .replace("LENGTH", &draw.below(14).to_string())
@@ -227,7 +227,7 @@ fn texts_that_are_expensive_to_compile_are_done_in_a_moment() {
     let many = |n: usize, with: &dyn Fn(usize) -> String| (0..n).map(with).collect::<String>();
     let nested = "[[[[1 for x in y] for y in z] for z in w]] + ".repeat(600);
     for text in [
-        // Names that mean nothing, beside many that mean something.
+        // Unknown names beside many known ones.
         format!("def main():\n    return [{}]", many(4000, &|n| format!("n{n},"))),
         many(2200, &|n| format!("a{n}=b{n}\n")),
         many(1200, &|n| format!("def f{n}():\n    g{n}()\n")),

@@ -68,6 +68,6 @@ fn champions_are_worth_what_their_judgement_says() {
         (low.get()..=high.get()).contains(&worth(&champion.genotype))
     };
     let n_covered = champions.iter().filter(is_covered).count();
-    // 95 % minus two standard errors.
+    // 95 %, within two standard errors.
     assert!((184..=196).contains(&n_covered), "{n_covered} of 200");
 }

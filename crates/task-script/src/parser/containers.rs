@@ -47,8 +47,8 @@ impl Parser<'_> {
         self.expr(line, Op::Dict(entries))
     }
 
-    /// The clauses of a comprehension, whose value stands before them, and the value; none
-    /// if there is no `for` before the end of the brackets.
+    /// The clauses of a comprehension, and its value, which stands before them; `None` if no
+    /// `for` comes before the end of the brackets.
     fn comprehension<T>(
         &mut self,
         close: &'static str,
@@ -96,7 +96,7 @@ impl Parser<'_> {
         Ok(Some((clauses, value)))
     }
 
-    /// Where the clauses begin, if these brackets hold a comprehension.
+    /// The index of the first clause, if these brackets contain a comprehension.
     fn comprehension_clauses(&self) -> Option<usize> {
         let mut n_brackets = 0;
         for (index, token) in self.tokens.iter().enumerate().skip(self.at) {

@@ -1,4 +1,4 @@
-//! How deep expressions are within each other.
+//! The nesting depth of expressions.
 
 use crate::code::{Clause, ElementKey, Expr, Op};
 

@@ -9,7 +9,7 @@ use crate::code::{
 use crate::error::{Outcome, shortened};
 use crate::lexer::Kind;
 
-/// What is given to a function.
+/// The arguments of a call.
 struct Arguments {
     values: Vec<Expr>,
     key: Option<ElementKey>,
@@ -17,7 +17,7 @@ struct Arguments {
 }
 
 impl<'a> Parser<'a> {
-    /// An expression, or several, which are a tuple.
+    /// An expression, or several, which make a tuple.
     pub(super) fn expression_list(&mut self) -> Outcome<Expr> {
         let line = self.line();
         let first = self.expression()?;
@@ -160,7 +160,7 @@ impl<'a> Parser<'a> {
         self.expr(line, if is_negative { Op::Negative(value) } else { Op::Positive(value) })
     }
 
-    /// A value with what follows it: calls, attributes, indices.
+    /// A value with its calls, attributes and indices.
     pub(super) fn operand(&mut self) -> Outcome<Expr> {
         let mut value = self.atom()?;
         loop {
@@ -362,7 +362,7 @@ impl<'a> Parser<'a> {
         Ok(arguments)
     }
 
-    /// What follows `key=`: a lambda of one argument, or a function of the script.
+    /// The value of `key=`: a lambda of one argument, or a function of the script.
     fn element_key(&mut self) -> Outcome<ElementKey> {
         if !self.accept_word("lambda") {
             let Kind::Name(name) = *self.kind() else {

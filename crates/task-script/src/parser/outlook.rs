@@ -1,12 +1,12 @@
-//! What is known of functions without executing them: their names, before they are read,
-//! and the keys of the dicts that they return.
+//! Static knowledge of functions: their names, before the parser reaches them, and the keys of
+//! the dicts that they return.
 
 use super::Parser;
 use crate::code::{Expr, Op, Stmt, StmtKind};
 use crate::lexer::{Kind, Token};
 
 impl<'a> Parser<'a> {
-    /// Finds the names of functions and constants, so that order does not matter.
+    /// Finds the names of functions and constants, so that their order does not matter.
     pub(super) fn look_ahead(&mut self) {
         let mut n_blocks = 0;
         let mut is_line_start = true;

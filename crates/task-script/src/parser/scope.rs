@@ -1,4 +1,4 @@
-//! The variables of a function, and where each is kept.
+//! The variables of a function, and their slots.
 
 /// Variables by their names.
 #[derive(Debug, Default)]
@@ -6,7 +6,7 @@ pub(super) struct Scope<'a> {
     variables: Vec<Entry<'a>>,
     /// Names of comprehensions and lambdas that are open, with their slots.
     inner: Vec<(&'a str, usize)>,
-    /// How many of them hide what is outside: where the open ones begin.
+    /// Number of names that hide outer ones: the index of the first open one.
     n_open: usize,
     n_locals: usize,
 }
@@ -16,13 +16,13 @@ struct Entry<'a> {
     name: &'a str,
     slot: usize,
     is_assigned: bool,
-    /// Where it was seen first.
+    /// Line of the first reading.
     line: u32,
 }
 
 /// A variable that was seen before.
 pub(super) enum Variable {
-    /// It was assigned, further up in the text.
+    /// It was assigned earlier in the text.
     Known(usize),
     /// It was only read.
     Pending(usize),
@@ -39,7 +39,7 @@ impl<'a> Scope<'a> {
         self.n_locals - 1
     }
 
-    /// The next parameter; false if there is one of this name.
+    /// Declares the next parameter; false if the name exists already.
     pub(super) fn declare_parameter(&mut self, name: &'a str) -> bool {
         let is_new = self.variables.iter().all(|entry| entry.name != name);
         let slot = self.slot();
@@ -47,7 +47,7 @@ impl<'a> Scope<'a> {
         is_new
     }
 
-    /// A name gets a value.
+    /// Declares a name that gets a value.
     pub(super) fn assign(&mut self, name: &'a str) -> usize {
         if self.n_open > 0 {
             let slot = self.slot();
@@ -63,7 +63,7 @@ impl<'a> Scope<'a> {
         slot
     }
 
-    /// A name is read that has no value so far.
+    /// Notes a name that is read without a value so far.
     pub(super) fn expect(&mut self, name: &'a str, line: u32) -> usize {
         let slot = self.slot();
         self.variables.push(Entry { name, slot, is_assigned: false, line });
@@ -81,14 +81,14 @@ impl<'a> Scope<'a> {
         })
     }
 
-    /// A comprehension or lambda begins: what is assigned from now on is its own. Returns
-    /// what [`close`](Self::close) needs.
+    /// Begins a comprehension or lambda, to which further names belong. Returns the mark for
+    /// [`close`](Self::close).
     pub(super) fn open(&mut self) -> usize {
         self.n_open += 1;
         self.inner.len()
     }
 
-    /// It ends.
+    /// Ends a comprehension or lambda.
     pub(super) fn close(&mut self, mark: usize) {
         self.n_open -= 1;
         self.inner.truncate(mark);
@@ -99,13 +99,13 @@ impl<'a> Scope<'a> {
         self.n_open > 0
     }
 
-    /// Names that are read and have no value anywhere, with the line of the first reading.
+    /// Names that are read and never assigned, with the line of the first reading.
     pub(super) fn never_assigned(&self) -> impl Iterator<Item = (&'a str, u32)> {
         let pending = self.variables.iter().filter(|entry| !entry.is_assigned);
         pending.map(|entry| (entry.name, entry.line))
     }
 
-    /// Names that have a value somewhere.
+    /// Names that are assigned somewhere.
     pub(super) fn assigned(&self) -> impl Iterator<Item = &'a str> {
         self.variables.iter().filter(|entry| entry.is_assigned).map(|entry| entry.name)
     }
