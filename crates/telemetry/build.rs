@@ -1,6 +1,5 @@
-//! Tells the programs which commit they are built from: of the variable
-//! `SWARMEVO_COMMIT`, else of git. Debug builds do not say it, so that a commit does not
-//! compile them again.
+//! Gives the programs the commit that they are built from: from the variable `SWARMEVO_COMMIT`,
+//! or else from git. Debug builds omit it, so that a commit does not recompile them.
 
 use std::{env, process::Command};
 

@@ -120,8 +120,8 @@ fn hostile(coordinator: &CoordinatorProcess, bundle: &Path) {
     for (content, what) in [
         (&bytes[..bytes.len() / 2], "cut off or damaged"),
         (&flipped[..], "damaged"),
-        (b"PK", "no bundle"),
-        (b"", "no bundle"),
+        (b"PK", "not a bundle"),
+        (b"", "not a bundle"),
     ] {
         fs::write(&path, content).unwrap();
         refused(&swarmctl(["verify", text]), 2, what);

@@ -111,12 +111,12 @@ parameters! {
     }
 }
 
-/// What fields with centres have in common.
+/// The common form of fields with centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadialField {
     /// Value at a distance d from the centre, between 0 and 1.
     pub shape: RadialShape,
-    /// `sigma` or `slope`.
+    /// The steepness: `sigma` or `slope`.
     pub steepness: f64,
     /// Nodes per value.
     pub n_neurons: u32,
@@ -124,7 +124,7 @@ pub struct RadialField {
     pub centres: [f64; 2],
     /// Values for 0 and 1 of the shape, before `inverted`.
     pub values: [f64; 2],
-    /// Whether 1 - the shape counts.
+    /// Whether to use 1 - the shape.
     pub inverted: bool,
 }
 
@@ -149,7 +149,8 @@ impl RadialField {
 }
 
 impl ReceptiveField {
-    /// The field as one with centres; none of the identity and the linear field.
+    /// The field in the common form of fields with centres; `None` for the identity and the
+    /// linear field.
     pub fn radial(&self) -> Option<RadialField> {
         let (shape, field) = match *self {
             Self::Identity {} | Self::Linear(_) => return None,
@@ -160,7 +161,7 @@ impl ReceptiveField {
         Some(field.radial(shape))
     }
 
-    /// Nodes of a stimulus of `n` values.
+    /// Number of nodes of a stimulus with `n` values.
     pub fn n_nodes(&self, n: u32) -> u32 {
         match self {
             Self::Identity {} => n,
@@ -169,7 +170,8 @@ impl ReceptiveField {
         }
     }
 
-    /// Weights that can evolve, for a stimulus of `n` values, node by node.
+    /// Number of weights that can evolve, for a stimulus with `n` values; they are ordered node
+    /// by node.
     pub fn n_weights(&self, n: u32) -> u32 {
         match self {
             Self::Linear(field) => field.n_neurons * n,
@@ -207,7 +209,7 @@ impl SlopedField {
 }
 
 impl LinearField {
-    /// Weight of a value in a node's sum, of `n` values, where no gene gives one.
+    /// Default weight of value `value` in the sum of node `node`, for a stimulus with `n` values.
     pub fn default_weight(&self, node: u32, value: u32, n: u32) -> f64 {
         let n_gaps = f64::from(self.n_neurons.max(2) - 1);
         let centre = f64::from(n) * f64::from(node) / n_gaps;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::ActuatorQuery;
 use crate::parameters::{parameters, variants};
 
-/// What an experiment must have for a fitness function to make sense of it.
+/// A requirement of a fitness function on the experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Need {
     /// The network drives this actuator.
@@ -40,7 +40,7 @@ variants! {
 /// Steps at the start of an episode that `alignment` does not count.
 pub const ALIGNMENT_SETTLING_STEPS: u32 = 100;
 
-/// From a row per fitness function: its name in the file, and what it needs.
+/// Declares the fitness functions, from one row each: its name in the file, and its requirements.
 macro_rules! fitness_functions {
     ($(
         $(#[doc = $doc:literal])*
@@ -67,7 +67,7 @@ macro_rules! fitness_functions {
                 }
             }
 
-            /// What the experiment must have.
+            /// Its requirements on the experiment.
             pub(crate) fn needs(self) -> &'static [Need] {
                 match self {
                     $(Self::$function => &[$($need),*],)*

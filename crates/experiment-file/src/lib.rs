@@ -1,4 +1,4 @@
-//! The experiment file as types, with every default filled in.
+//! The types of the experiment file, with every default filled in.
 //!
 //! [`ExperimentConfig::from_json`] reads one. It is strict, and it reports every
 //! problem of a file at once:
@@ -50,17 +50,16 @@
 //! # Ok::<(), experiment_file::ConfigError>(())
 //! ```
 //!
-//! Serialising an [`ExperimentConfig`] gives its *canonical form*: all keys present
-//! in a fixed order, and itself a valid experiment file that reads back to an equal
-//! value. Workers get it, digests hash it. Keys that the format did not always have are
-//! left out where they have their default, so that older files keep their digests.
+//! Serialising an [`ExperimentConfig`] gives its *canonical form*: all keys present in a fixed
+//! order, and itself a valid experiment file that reads back to an equal value. Workers get the
+//! canonical form, and digests hash it. It omits keys that are newer than the format if they have
+//! their defaults, so that older files keep their digests.
 //!
 //! Lengths are centimetres, times environment steps, angles radians, unless a
 //! field says otherwise.
 //!
-//! `read` turns text into values, `check` looks at how the values relate to each
-//! other, and both write what they find to a `report`; `schema` describes the same
-//! format for editors.
+//! `read` turns text into values, `check` compares the values with each other, and both write
+//! problems to a `report`. `schema` describes the same format for editors.
 
 mod actuators;
 mod algorithm;
@@ -119,7 +118,7 @@ pub use world::*;
 use read::Algorithms;
 use report::Report;
 
-/// Maps whose order carries meaning (order of inputs, of segments, of robots).
+/// A map whose order matters (of inputs, segments or robots).
 pub type NamedMap<T> = indexmap::IndexMap<String, T>;
 
 /// A whole experiment: network, evolution, world.
@@ -151,10 +150,13 @@ pub struct ExperimentConfig {
 }
 
 impl ExperimentConfig {
-    /// Reads an experiment file. Returns the configuration and the warnings
-    /// (keys that are accepted and ignored), or every problem of the file.
-    /// `default_name` names an experiment whose file gives no name. `algorithms`
-    /// are those that the file may name: `evolution::ALGORITHMS`.
+    /// Reads an experiment file. Returns the configuration and the warnings (such as keys that
+    /// are accepted and ignored). `default_name` names an experiment whose file gives no name.
+    /// `algorithms`: the algorithms that the file may name, usually `evolution::ALGORITHMS`.
+    ///
+    /// # Errors
+    ///
+    /// Every problem of the file, each with its place.
     pub fn from_json(
         text: &str,
         default_name: &str,
@@ -163,9 +165,12 @@ impl ExperimentConfig {
         Self::read(text, default_name, Algorithms::Described(algorithms))
     }
 
-    /// Reads a canonical form, for programs that only simulate. It is checked like
-    /// any file, but for the algorithm's name and parameters: they are kept as they
-    /// are.
+    /// Reads a canonical form, for programs that only simulate. It checks the text like any file,
+    /// except the algorithm's name and parameters, which it keeps unchanged.
+    ///
+    /// # Errors
+    ///
+    /// Every problem of the text, each with its place.
     pub fn from_canonical_json(text: &str) -> Result<Self, ConfigError> {
         Self::read(text, "", Algorithms::Unchecked).map(|(config, _)| config)
     }
@@ -188,7 +193,7 @@ impl ExperimentConfig {
         Ok((config, warnings))
     }
 
-    /// The swarms with their names, in the order that numbers the robots.
+    /// The swarms with their names, in the order of the robots' numbers.
     pub fn robots(&self) -> impl Iterator<Item = (&str, &RobotConfig)> {
         self.world.objects.iter().filter_map(|(name, object)| match object {
             ObjectConfig::Robot(robot) => Some((name.as_str(), robot)),

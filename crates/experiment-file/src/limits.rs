@@ -1,9 +1,8 @@
-//! Upper bounds of what an experiment may ask for.
+//! Limits on the size and cost of an experiment.
 //!
-//! Experiment files come from the network: one that is accepted must not exhaust
-//! the memory of the coordinator or of a worker, nor keep a worker busy for
-//! hours with a single episode. The bounds lie far above the experiments that
-//! this simulator exists for (10 to 50 robots, 24 neurons, about 450 genes).
+//! Experiment files come from the network. An accepted file must not exhaust the memory of the
+//! coordinator or of a worker, nor keep a worker busy for hours with a single episode. The limits
+//! are far above typical experiments (10 to 50 robots, 24 neurons, about 450 genes).
 
 use std::ops::RangeInclusive;
 
@@ -11,9 +10,9 @@ use std::ops::RangeInclusive;
 pub const FILE_BYTES: usize = 1 << 20;
 /// Bytes of a script.
 pub const SCRIPT_BYTES: usize = 32 << 10;
-/// Lists and objects within each other.
+/// Nesting depth of lists and objects.
 pub const NESTING: usize = 64;
-/// Problems that are reported one by one; the rest is counted.
+/// Number of problems to list; further ones are counted.
 pub const PROBLEMS: usize = 100;
 /// Characters of a name.
 pub const NAME_CHARS: usize = 128;
@@ -57,9 +56,9 @@ pub const DELAYS: RangeInclusive<u32> = 1..=9;
 pub const SYNAPSE_GAIN: f64 = 1_000.0;
 /// Nodes of a receptive field per value of the stimulus.
 pub const FIELD_NODES: u32 = 1_000;
-/// Absolute value of what receptive fields take and yield.
+/// Absolute value of inputs and outputs of receptive fields.
 pub const FIELD_VALUE: f64 = 1e6;
-/// How fast a receptive field falls.
+/// Steepness of a receptive field.
 pub const STEEPNESS: f64 = 1e6;
 /// Rates of Poisson encoders: with the highest, a node spikes in every substep.
 pub const POISSON_RATE: RangeInclusive<f64> = 0.0..=10_000.0;
@@ -67,7 +66,7 @@ pub const POISSON_RATE: RangeInclusive<f64> = 0.0..=10_000.0;
 pub const COEFFICIENT: f64 = 1e6;
 /// Absolute value of a plastic weight.
 pub const PLASTIC_WEIGHT: f64 = 1e6;
-/// Environment steps from activities to the reward that they get.
+/// Environment steps from activities to their reward.
 pub const REWARD_DELAY: u32 = 1_000;
 /// Network substeps per environment step.
 pub const TIME_SCALE: u32 = 1_000;

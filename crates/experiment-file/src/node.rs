@@ -1,7 +1,7 @@
-//! Cursors over the syntax tree: what a reader of one value or object needs.
+//! Cursors over the syntax tree, for readers of one value or object.
 //!
-//! A reader never stops at a problem. It reports it and goes on with a
-//! placeholder, so that one pass finds everything that is wrong with a file.
+//! A reader never stops at a problem. It reports the problem and continues with a placeholder, so
+//! that one pass finds all problems of a file.
 
 use std::ops::RangeInclusive;
 use std::str::FromStr;
@@ -17,7 +17,7 @@ use crate::{NamedMap, ParameterValue, Seed, limits};
 
 type Properties<'a> = IndexMap<&'a str, &'a Value<'a>>;
 
-/// What a number is as a whole one.
+/// A number as a whole number.
 enum Whole {
     Number(u64),
     /// Negative, or more than 64 bits.
@@ -25,9 +25,9 @@ enum Whole {
     Not,
 }
 
-/// JSON Schema takes `32.0` and `1e3` for whole numbers, too.
+/// Reads a whole number; as in JSON Schema, also `32.0` and `1e3`.
 fn whole_number(text: &str) -> Whole {
-    /// Above, not every whole number is an f64.
+    /// Largest number up to which every whole number is an f64.
     const EXACT_MAX: f64 = (1_u64 << 53) as f64;
     if let Ok(number) = text.parse() {
         return Whole::Number(number);
@@ -40,7 +40,7 @@ fn whole_number(text: &str) -> Whole {
     }
 }
 
-/// One value of the file; or, after a problem, a silent stand-in for one.
+/// One value of the file; or, after a problem, a silent placeholder.
 pub(crate) struct Node<'a> {
     report: &'a Report<'a>,
     path: Path,
@@ -63,7 +63,7 @@ impl<'a> Node<'a> {
         matches!(self.value, Some(Value::NullKeyword(_)))
     }
 
-    /// What `read` makes of the value; none for null.
+    /// The result of `read` on the value; `None` for null.
     pub(crate) fn or_null<T>(self, read: impl FnOnce(Self) -> T) -> Option<T> {
         if self.is_null() { None } else { Some(read(self)) }
     }
@@ -104,7 +104,7 @@ impl<'a> Node<'a> {
         text.to_owned()
     }
 
-    /// A string that is shown to people and refers to things.
+    /// A string that is a name.
     pub(crate) fn name(self) -> String {
         let (report, path) = (self.report, self.path.clone());
         let Some(name) = self.string() else {
@@ -146,8 +146,8 @@ impl<'a> Node<'a> {
         number.try_into().unwrap_or(*range.start())
     }
 
-    /// A whole number of 64 bits; or text of its digits, as programs write it that would round
-    /// the number.
+    /// A whole number of 64 bits; or its digits as text, from programs that would round the
+    /// number.
     pub(crate) fn seed(self) -> u64 {
         if !self.is_string() {
             return self.u64(0..=u64::MAX);
@@ -162,7 +162,7 @@ impl<'a> Node<'a> {
         })
     }
 
-    /// A number of a range; `POSITIVE` is worded as what it stands for.
+    /// A number within a range; messages name the range `POSITIVE` as positive.
     pub(crate) fn number(self, range: RangeInclusive<f64>) -> f64 {
         let (min, max) = (*range.start(), *range.end());
         let is_positive = range == POSITIVE;
@@ -197,7 +197,7 @@ impl<'a> Node<'a> {
         self.number(QUANTITY)
     }
 
-    /// A parameter of an algorithm that nothing is known of: a number or a name.
+    /// A parameter of an unknown algorithm: a number or a name.
     pub(crate) fn parameter(self) -> ParameterValue {
         match self.value {
             Some(Value::StringLit(_)) => ParameterValue::Name(self.name()),
@@ -262,8 +262,7 @@ impl<'a> Node<'a> {
         elements.map(|(i, element)| self.inner(self.path.index(i), Some(element))).collect()
     }
 
-    /// An object with known keys. Keys that `read` asks for are known; what is
-    /// left over is reported.
+    /// An object with known keys. Keys that `read` asks for are known; all others are reported.
     pub(crate) fn object<T>(self, read: impl FnOnce(&mut Object<'a>) -> T) -> T {
         let properties = self.properties();
         self.read_object(properties, read)
@@ -361,12 +360,12 @@ impl<'a> Node<'a> {
     }
 }
 
-/// The properties of one object; or, after a problem, a silent stand-in.
+/// The properties of one object; or, after a problem, a silent placeholder.
 pub(crate) struct Object<'a> {
     report: &'a Report<'a>,
     path: Path,
     is_silent: bool,
-    /// Those that nobody has asked for yet.
+    /// The properties that the reader has not asked for yet.
     properties: Properties<'a>,
     known: Vec<&'static str>,
 }
@@ -380,7 +379,7 @@ impl<'a> Object<'a> {
         Some(Node { report: self.report, path: self.path.key(key), value: Some(value) })
     }
 
-    /// Whether the file has a key that nobody has asked for yet.
+    /// Whether the file has a key that the reader has not asked for yet.
     pub(crate) fn has(&self, key: &str) -> bool {
         self.properties.contains_key(key)
     }
@@ -436,8 +435,7 @@ impl<'a> Object<'a> {
         }
     }
 
-    /// Accepts whatever keys are left, because what is known here depends on
-    /// something unreadable.
+    /// Accepts all remaining keys, because the known ones depend on an unreadable value.
     pub(crate) fn accept_rest(&mut self) {
         self.properties.clear();
     }

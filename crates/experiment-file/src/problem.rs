@@ -1,17 +1,16 @@
-//! What is wrong with an experiment file.
+//! The problems of an experiment file.
 
 use std::fmt;
 
 /// One remark about an experiment file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Problem {
-    /// Where, such as `world.objects.robotA.num_instances`; empty for the whole
-    /// file.
+    /// The place, such as `world.objects.robotA.num_instances`; empty for the whole file.
     pub path: String,
-    /// Line in the file, from 1; none if the text has no such place (a missing
-    /// key has its parent's line).
+    /// Line in the file, from 1; `None` if the text has no such place (a missing key has its
+    /// parent's line).
     pub line: Option<usize>,
-    /// What is wrong and what would be right.
+    /// The problem, and the allowed values.
     pub message: String,
 }
 

@@ -149,13 +149,13 @@ impl fmt::Display for GenotypeQuery {
     }
 }
 
-/// A text that is no query.
+/// Why a text is not a query.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ParseQueryError {
-    /// It names something of the original simulator that this one lacks.
+    /// The text names a part of the original simulator that this one lacks.
     #[error("not supported: `{0}`")]
     Unsupported(String),
-    /// It has another form.
+    /// The text has another form.
     #[error(
         "expected `synapses:weights:NAME`, `synapses:delays:NAME`, `encoders:weights:NAME`, \
          `decoders:weights:NAME`, `learning:coefficients:NAME` or `neurons:PARAMETER:NAME`, with a \

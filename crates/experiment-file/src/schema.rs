@@ -1,8 +1,8 @@
 //! The JSON Schema of experiment files, for editors and other programs.
 //!
-//! It is derived from the types. They describe the canonical form; what a file
-//! may say beyond that (keys left out, other forms, keys of the original
-//! simulator) is added by the attributes on them, in the words defined here.
+//! It is derived from the types, which describe the canonical form. Attributes on them add the
+//! further forms of a file (omitted keys, other notations, keys of the original simulator), with
+//! the functions defined here.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::{Map, Value, json};
@@ -13,16 +13,16 @@ use super::{
     parameters,
 };
 
-/// Describes the format that [`ExperimentConfig::from_json`] reads (JSON Schema,
-/// draft 2020-12). What it cannot express (names that resolve, sizes that agree,
-/// costs) only the reader checks. `algorithms` are those that a file may name.
+/// Describes the format that [`ExperimentConfig::from_json`] reads (JSON Schema, draft 2020-12).
+/// Only the reader checks relations that a schema cannot express (names that resolve, sizes that
+/// agree, costs). `algorithms`: the algorithms that a file may name.
 pub fn json_schema(algorithms: &[AlgorithmDescription]) -> Value {
     let mut schema = schema_for!(ExperimentConfig).to_value();
     describe_algorithms(&mut schema, algorithms);
     schema
 }
 
-/// A place that the descriptions of the algorithms fill in.
+/// A placeholder that the descriptions of the algorithms fill in.
 pub(super) fn filled_in(_: &mut SchemaGenerator) -> Schema {
     json_schema!({})
 }
@@ -116,7 +116,7 @@ pub(super) fn food_areas_and_nests(schema: &mut Schema) {
     }
 }
 
-/// Things by the names that the file chooses.
+/// A map from names that the file chooses to values.
 pub(super) fn map<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
     let entry = generator.subschema_for::<T>();
     json_schema!({
@@ -171,7 +171,7 @@ pub(super) fn script(_: &mut SchemaGenerator) -> Schema {
     ]})
 }
 
-/// Whose defaults a file has.
+/// The schema of the key that chooses the defaults.
 pub(super) fn semantics() -> Value {
     json!({
         "enum": ["thesis", "original"],

@@ -1,19 +1,19 @@
-//! A seed in JSON: a number as far as every program reads it exactly, text beyond.
+//! Seeds in JSON: a number if every program reads it exactly, otherwise text.
 
 use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-/// Greatest seed that is a number in JSON: JavaScript and jq round those beyond it.
+/// Largest seed that is a number in JSON, because JavaScript and jq round larger ones.
 const NUMBER_MAX: u64 = 1 << 53;
 
-/// A seed, as JSON answers and files of results have it: from 2^53 + 1 on as text of
-/// digits. It is read in both forms.
+/// A seed in JSON answers and files of results. From 2^53 + 1 on, it is written as text of
+/// digits; both forms are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Seed(pub u64);
 
 impl Seed {
-    /// The seed that a text of digits is.
+    /// Reads a seed from its digits.
     pub fn from_digits(text: &str) -> Option<Self> {
         let is_plain = text.bytes().all(|byte| byte.is_ascii_digit());
         text.parse().ok().filter(|_| is_plain).map(Self)
@@ -36,7 +36,7 @@ impl<'de> Deserialize<'de> for Seed {
     }
 }
 
-/// Takes a number, or its digits.
+/// Reads a number, or its digits as text.
 struct Digits;
 
 impl de::Visitor<'_> for Digits {

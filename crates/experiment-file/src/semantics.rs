@@ -1,13 +1,13 @@
-//! `semantics`: what a file means where it is silent. The original's way consists of the
-//! defaults that tables of parameters call `original`. Every such key can be given alone, too;
+//! `semantics`: chooses the defaults of omitted keys. The original simulator's defaults are those
+//! that tables of parameters call `original`. Every such key can be given alone, too;
 //! `docs/fidelity.md` explains each.
 
 use serde::Deserialize;
 
 use super::{Parameters, parameters};
 
-/// Whose values the keys have that a file leaves out. It is no part of an experiment:
-/// the canonical form has the values.
+/// The source of defaults for omitted keys. It is not part of an experiment, because the
+/// canonical form contains the values.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Semantics {

@@ -63,7 +63,7 @@ macro_rules! sensors {
         }
 
         impl SensorsConfig {
-            /// Number of values of a reading; none if its sensor is not mounted.
+            /// Number of values of a reading; `None` if its sensor is not mounted.
             pub fn reading_len(&self, reading: SensorQuery) -> Option<u32> {
                 match reading {
                     $($(
@@ -174,7 +174,7 @@ sensors! {
     }
 }
 
-/// Numbers of sectors, and of whatever else a sensor has a value for.
+/// Range of the number of sectors, and of other numbers of values.
 const SECTORS: [u32; 2] = [1, limits::SECTORS];
 
 /// The original states the standard deviation of noise.

@@ -28,8 +28,8 @@ pub struct ScriptConfig {
     pub text: String,
 }
 
-/// The script that a file refers to by a path, and where in the text of the file the path
-/// stands. None if there is no such path, or if the text is no JSON.
+/// The path of the script to which a file refers, and the range of bytes of that path in the
+/// text. `None` if there is no such path, or if the text is not JSON.
 pub fn script_path(text: &str) -> Option<(String, Range<usize>)> {
     let text = read::plain(text);
     let root = read::parse(&text).ok()?;
@@ -48,7 +48,7 @@ fn property<'a>(value: &'a Value<'a>, name: &str) -> Option<&'a Value<'a>> {
         .map(|property| &property.value)
 }
 
-/// The text of a file with its script in the place of the path, in the same number of lines.
+/// The text of a file with the script in place of its path, with the same number of lines.
 pub fn inline_script(text: &str, place: Range<usize>, script: &ScriptConfig) -> String {
     let script = serde_json::to_string(script).expect("two strings serialise");
     [&text[..place.start], &script, &text[place.end..]].concat()

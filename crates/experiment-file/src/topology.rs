@@ -70,7 +70,7 @@ parameters! {
 }
 
 impl TopologyConfig {
-    /// What synapses can start from in a stimulus: nodes of its encoder, or its values.
+    /// Number of possible synapse sources in a stimulus: nodes of its encoder, or its values.
     pub fn n_sources(&self, stimulus: &str) -> u32 {
         let n = self.stimuli.get(stimulus).map_or(0, |stimulus| stimulus.n);
         self.encoding.get(stimulus).map_or(n, |encoding| encoding.receptive_field.n_nodes(n))
@@ -104,7 +104,7 @@ parameters! {
         /// What it drives.
         actuator: ActuatorQuery = of(Domain::Variant(ActuatorQuery::VARIANTS), Required),
     }
-    // Says what the decoding says, too; nothing depends on it.
+    // Repeats a value of the decoding; nothing depends on it.
     checked { Parameter::one_of("enc", &["real", "cat"], &[], "") }
 }
 
@@ -224,7 +224,7 @@ kinds! {
             rest_value: f64 = between([-1.0, 1.0], 0.5),
         } = "LinearPopulationDecoding",
     }
-    // Says what the scheme says, too; nothing depends on it.
+    // Repeats a value of the scheme; nothing depends on it.
     checked { Parameter::switch("is_cat", false, "") }
 }
 
@@ -235,7 +235,7 @@ impl DecodingConfig {
         matches!(self, FirstToSpike {} | RankOrderDecoding { .. } | LinearPopulationDecoding { .. })
     }
 
-    /// Values that it yields for an ensemble of `n` neurons, unless it yields a category.
+    /// Number of values for an ensemble of `n` neurons, unless the decoding yields a category.
     pub fn n_values(self, n: u32) -> u32 {
         match self {
             Self::RankOrderDecoding { num_outputs }
@@ -244,7 +244,7 @@ impl DecodingConfig {
         }
     }
 
-    /// Its weights for an ensemble of `n` neurons, value by value.
+    /// Number of weights for an ensemble of `n` neurons; they are ordered value by value.
     pub fn n_weights(self, n: u32) -> u32 {
         match self {
             Self::RankOrderDecoding { num_outputs }

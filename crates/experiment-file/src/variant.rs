@@ -1,5 +1,5 @@
-//! Unit variants of an enum by the names that `serde` gives them, so that no
-//! second list of names can drift from the types.
+//! Finds unit variants of an enum by their `serde` names, so that no second list of names can
+//! differ from the types.
 
 use std::fmt;
 

@@ -1,5 +1,5 @@
-//! The HTTP endpoint that Prometheus scrapes: `GET /metrics`, and nothing else. It
-//! reads, so it asks for no token; it is there only if somebody gives it an address.
+//! The HTTP endpoint for Prometheus: `GET /metrics`, and nothing else. It only reads, so it
+//! requires no token. It exists only if an option gives it an address.
 
 use std::{convert::Infallible, future::pending, io, net::SocketAddr, time::Duration};
 
@@ -15,8 +15,8 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-/// Connections, with one request each: nobody is known better than others. One more ends
-/// the oldest: a scrape takes milliseconds, so the oldest is nobody's who scrapes.
+/// Limits of connections, with one request each, equal for all peers. One connection too many
+/// ends the oldest: a scrape takes milliseconds, so the oldest does not belong to a scraper.
 /// Prometheus itself waits for 10 s.
 const CONNECTIONS: ListenerLimits = ListenerLimits {
     strangers: Room {
@@ -28,7 +28,7 @@ const CONNECTIONS: ListenerLimits = ListenerLimits {
     known: Known::Refused { n_places: 0 },
     stall_time: Duration::from_secs(10),
 };
-/// Requests.
+/// Limits of requests.
 const REQUESTS: HttpLimits = HttpLimits {
     headers_time: Duration::from_secs(2),
     headers_len: 16 << 10,
@@ -36,13 +36,13 @@ const REQUESTS: HttpLimits = HttpLimits {
     keep_alive: false,
 };
 
-/// The address for metrics cannot be listened on.
+/// Listening on the address for metrics failed.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot listen on {address} for metrics: {source}; give another --metrics-listen")]
 pub struct ListenError {
     /// The address.
     pub address: SocketAddr,
-    /// What the system says.
+    /// The system's error.
     pub source: io::Error,
 }
 
@@ -65,8 +65,8 @@ impl Endpoint {
         Ok(Self { listener })
     }
 
-    /// Answers with what `scrape` says, for as long as it is polled; while that says
-    /// nothing, with 503.
+    /// Answers with the text of `scrape`, or with 503 if that returns `None`, for as long as the
+    /// future is polled.
     pub async fn serve<S>(
         self,
         scrape: impl Fn() -> S + Clone + Send + Sync + 'static,
@@ -128,10 +128,10 @@ mod tests {
         address
     }
 
-    /// Sends a request; returns all of the answer, up to the connection's end.
+    /// Sends a request; returns the whole answer, up to the connection's end.
     async fn ask(address: SocketAddr, request: &str) -> String {
         let mut stream = TcpStream::connect(address).await.unwrap();
-        // The answer may come, and the connection end, before all of it is sent.
+        // The answer and the end of the connection may arrive before the whole request is sent.
         let _ = stream.write_all(request.as_bytes()).await;
         let mut answer = Vec::new();
         let _ = stream.read_to_end(&mut answer).await;
@@ -198,7 +198,7 @@ mod tests {
     async fn one_connection_too_many_ends_the_oldest() {
         let endpoint = Endpoint::listen("127.0.0.1:0".parse().unwrap()).await.unwrap();
         let address = endpoint.listener.local_addr().unwrap();
-        // Nobody is answered, and every connection gets as far as asking.
+        // No connection gets an answer, and every one sends its request.
         let (asked, mut questions) = tokio::sync::mpsc::unbounded_channel();
         tokio::spawn(endpoint.serve(move || {
             asked.send(()).unwrap();
@@ -212,7 +212,7 @@ mod tests {
             taken.push(stream);
         }
         let mut answer = Vec::new();
-        // Ended, whether in order or not.
+        // Ended, properly or not.
         let _ = taken[0].read_to_end(&mut answer).await;
         assert!(answer.is_empty());
     }

@@ -26,7 +26,7 @@ pub struct LogArgs {
     /// Format of the log lines.
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     log_format: LogFormat,
-    /// What to log: error, warn, info, debug or trace, also per module
+    /// Level of lines to log: error, warn, info, debug or trace, also per module
     /// (info,worker=debug).
     #[arg(long, env = "SWARM_LOG", default_value = "info")]
     log_level: String,
@@ -67,11 +67,11 @@ impl LogArgs {
     }
 }
 
-/// Libraries whose lines are about what peers do.
+/// Libraries whose lines report the behaviour of peers.
 const LIBRARIES: [&str; 6] = ["h2", "hyper", "hyper_util", "rustls", "tonic", "tower"];
 
-/// Withholds lines of libraries at INFO and above beyond one per second each, as any
-/// peer can cause any number of them. Whoever wants more detail gets all of it.
+/// Withholds lines of libraries at INFO and above beyond one per second each, because any peer
+/// can cause any number of them. At a more detailed level, it withholds nothing.
 #[derive(Debug, Default)]
 struct LibraryThrottle {
     throttles: Mutex<BTreeMap<&'static str, Throttle>>,
@@ -106,7 +106,7 @@ mod tests {
 
     use super::*;
 
-    /// What is written.
+    /// The written lines.
     #[derive(Debug, Clone, Default)]
     struct Lines(Arc<Mutex<Vec<u8>>>);
 

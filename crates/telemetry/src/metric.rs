@@ -1,4 +1,4 @@
-//! Metrics as a program defines them, and their values in Prometheus' text format.
+//! Definitions of metrics, and their values in Prometheus' text format.
 
 use std::collections::BTreeMap;
 
@@ -8,31 +8,31 @@ use prometheus::{
     proto::{Counter, Gauge, LabelPair, Metric as Series, MetricFamily, MetricType},
 };
 
-/// A metric that a program has.
+/// The definition of a metric.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Metric {
     /// Unique, with its unit, and with `_total` for a counter.
     pub name: &'static str,
-    /// What its values are.
+    /// The kind of its values.
     pub kind: Kind,
-    /// Names of the labels that tell its series apart.
+    /// Names of the labels that distinguish its series.
     pub labels: &'static [&'static str],
-    /// What it means.
+    /// Its meaning, for people.
     pub help: &'static str,
 }
 
-/// What the values of a metric are.
+/// The kind of values of a metric.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// As it is now.
+    /// A present value.
     Gauge,
-    /// Since the program's start.
+    /// A sum since the program's start.
     Counter,
-    /// How often what was measured was at most so large, since the program's start.
+    /// Numbers of measurements up to each bound, since the program's start.
     Histogram,
 }
 
-/// Defines a program's metrics, and `METRICS`, all of them.
+/// Defines a program's metrics, and the list `METRICS` of all of them.
 #[macro_export]
 macro_rules! metrics {
     ($($id:ident = $kind:ident $name:literal [$($label:literal),*] $help:literal;)*) => {
@@ -59,7 +59,7 @@ impl Kind {
 }
 
 impl Metric {
-    /// An empty histogram, for a metric that is one and has no labels. `bounds`: of
+    /// An empty histogram, for a metric of that kind without labels. `bounds`: upper bounds of
     /// the buckets, ascending.
     pub fn histogram(&self, bounds: &[f64]) -> Histogram {
         let options = HistogramOpts::new(self.name, self.help).buckets(bounds.to_vec());
@@ -67,14 +67,14 @@ impl Metric {
     }
 }
 
-/// The values of a moment. What is not put in has no series.
+/// The values at one moment. Metrics without a value have no series.
 #[derive(Debug, Default)]
 pub struct Scrape {
     families: BTreeMap<&'static str, MetricFamily>,
 }
 
 impl Scrape {
-    /// Puts in the value of a gauge or counter; `labels`: in the order of their names.
+    /// Adds the value of a gauge or counter; `labels`: in the order of their names.
     pub fn put(&mut self, metric: &Metric, labels: &[&str], value: f64) {
         debug_assert_eq!(labels.len(), metric.labels.len(), "{}", metric.name);
         let pairs = metric.labels.iter().zip(labels).map(|(name, value)| {
@@ -109,12 +109,12 @@ impl Scrape {
         family.mut_metric().push(series);
     }
 
-    /// Puts in a histogram.
+    /// Adds a histogram.
     pub fn put_histogram(&mut self, metric: &Metric, histogram: &Histogram) {
         self.families.extend(histogram.collect().into_iter().map(|family| (metric.name, family)));
     }
 
-    /// All of it in Prometheus' text format, sorted by name.
+    /// All values in Prometheus' text format, sorted by name.
     pub fn into_text(self) -> String {
         let families: Vec<MetricFamily> = self.families.into_values().collect();
         TextEncoder::new().encode_to_string(&families).expect("every family has a series")

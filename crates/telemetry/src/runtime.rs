@@ -1,8 +1,8 @@
-//! The runtime of a program, sized to the threads that the system lets it have.
+//! The runtime of a program, sized to the threads that the system allows.
 //!
-//! All threads that the runtime needs in order to go on are started at its beginning and
-//! kept, so that a limit that is reached later stops nothing. Where a thread is refused all
-//! the same, the program ends with one line.
+//! The runtime starts all threads that it needs at its beginning, and keeps them, so that a limit
+//! that is reached later stops nothing. If the system still refuses a thread, the program ends
+//! with one line.
 
 use std::{
     fs, io, panic,
@@ -18,24 +18,25 @@ use crate::{
     text::report,
 };
 
-/// Exit code of a program that the system gives too little to start or to go on: threads,
-/// memory for their stacks, file descriptors.
+/// Exit code of a program that cannot start or continue because the system gives too few threads
+/// or file descriptors, or too little memory.
 pub const EXIT_STARVED: u8 = 71;
-/// Threads for what blocks: database, checks, reconstructions. More work than this waits.
+/// Most threads for blocking work: database, checks, reconstructions. Further work waits.
 const BLOCKING_MAX: usize = 32;
-/// Those of them that always are there.
+/// Number of these threads that always exist.
 const BLOCKING_KEPT: usize = 2;
-/// Pairs of file descriptors that a program needs at least, beside those with which it starts:
-/// for the database, signals, connections, and what it writes.
+/// Pairs of file descriptors that a program needs at least, in addition to those at its start:
+/// for the database, signals, connections and files.
 const PIPES_MIN: usize = 12;
-/// Those for each processor, as `run` has a worker there, at most for [`PROCESSORS_MAX`].
+/// Further pairs for each processor, because `run` has a worker there, at most for
+/// [`PROCESSORS_MAX`].
 const PIPES_PER_PROCESSOR: usize = 2;
 const PROCESSORS_MAX: usize = 32;
-/// Bytes that it computes with at least, beside stacks of threads.
+/// Bytes of memory that it needs at least, in addition to stacks of threads.
 const MEMORY_MIN: usize = 64 << 20;
-/// Time for threads that have ended to be gone, ms.
+/// Time for ended threads to disappear, ms.
 const GONE_TIME_MS: usize = 1000;
-/// Longer than a program runs.
+/// A time longer than any program runs.
 const FOR_EVER: Duration = Duration::from_secs(1 << 32);
 
 /// The system gives the program too little to start.
@@ -48,29 +49,29 @@ const FOR_EVER: Duration = Duration::from_secs(1 << 32);
 pub struct Starved(io::Error);
 
 impl Starved {
-    /// For this reason.
+    /// The error for this reason.
     pub fn new(reason: io::Error) -> Self {
         Self(reason)
     }
 }
 
-/// Runs a program's future to its end. Work on other threads that goes on then is nobody's any
-/// more: the program does not wait for it.
+/// Runs a program's future to its end. The program does not wait for remaining work on other
+/// threads.
 pub fn block_on<T>(runtime: Runtime, program: impl Future<Output = T>) -> T {
     let ended = runtime.block_on(program);
     runtime.shutdown_background();
     ended
 }
 
-/// How many threads there are of which kind.
+/// Numbers of threads by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Sizes {
-    /// 0: the thread that starts the runtime does all.
+    /// Number of workers; 0: the thread that starts the runtime does all work.
     workers: usize,
     blocking: usize,
 }
 
-/// Shares out `granted` threads if `wanted` are not to be had; none if they are too few.
+/// Divides `granted` threads if the system does not give `wanted`; `None` if they are too few.
 fn sizes(wanted: Sizes, granted: usize) -> Option<Sizes> {
     if granted >= wanted.workers + wanted.blocking {
         return Some(wanted);
@@ -78,7 +79,7 @@ fn sizes(wanted: Sizes, granted: usize) -> Option<Sizes> {
     match granted {
         0 => None,
         1 | 2 => Some(Sizes { workers: 0, blocking: granted }),
-        // The rest is for what the program starts later.
+        // The rest is for threads that the program starts later.
         _ => Some(Sizes {
             workers: wanted.workers.min(granted / 4).max(1),
             blocking: wanted.blocking.min(granted / 2),
@@ -86,16 +87,16 @@ fn sizes(wanted: Sizes, granted: usize) -> Option<Sizes> {
     }
 }
 
-/// A runtime with as many threads as the program can use, or as the system lets it have.
-/// `n_others`: threads that the program starts beside it and needs. From here on a panic
-/// because of a thread that is refused is one line and [`EXIT_STARVED`].
+/// A runtime with as many threads as the program can use, or as the system allows. `n_others`:
+/// number of other threads that the program needs. From here on, a panic because of a refused
+/// thread becomes one line and [`EXIT_STARVED`].
 pub fn runtime(n_others: usize) -> Result<Runtime, Starved> {
     keep_little();
     report_refused_threads();
     let n_cores = thread::available_parallelism().map_or(1, Into::into);
     let wanted = Sizes { workers: n_cores, blocking: BLOCKING_MAX };
     find_files(PIPES_MIN + PIPES_PER_PROCESSOR * n_cores.min(PROCESSORS_MAX)).map_err(Starved)?;
-    // Threads are shared out from what is left beside it.
+    // The threads are divided after this memory is reserved.
     let memory = find_memory(MEMORY_MIN).map_err(Starved)?;
     let n_before = n_threads();
     let (n_granted, refusal) = granted(n_cores + BLOCKING_MAX + n_others);
@@ -121,20 +122,20 @@ pub fn runtime(n_others: usize) -> Result<Runtime, Starved> {
     Ok(runtime)
 }
 
-/// Fails unless so many pairs of file descriptors are to be had: in the middle of its work
-/// a program would say of the disk or of the network what is true of them.
+/// Fails unless this many pairs of file descriptors are available. Without this check, the
+/// program would later blame the disk or the network.
 fn find_files(n_pipes: usize) -> io::Result<()> {
     (0..n_pipes).map(|_| io::pipe()).collect::<io::Result<Vec<_>>>().map(drop)
 }
 
-/// Room for so many bytes, until it is dropped; they are not written to.
+/// Reserves this many bytes until the result is dropped, without writing to them.
 fn find_memory(len: usize) -> io::Result<Vec<u8>> {
     let mut room = Vec::new();
     room.try_reserve_exact(len).map_err(|_| io::ErrorKind::OutOfMemory)?;
     Ok(room)
 }
 
-/// Starts this many of the threads for what blocks, all of which wait for each other.
+/// Starts this many threads for blocking work, which all wait for each other.
 fn keep(runtime: &Runtime, n_kept: usize) {
     let together = Arc::new(Barrier::new(n_kept));
     for _ in 0..n_kept {
@@ -145,7 +146,8 @@ fn keep(runtime: &Runtime, n_kept: usize) {
     }
 }
 
-/// How many of `n_max` threads the system starts at the same time, and why no more.
+/// The number of threads, up to `n_max`, that the system starts at the same time, and why no
+/// more.
 fn granted(n_max: usize) -> (usize, Option<io::Error>) {
     let hold = RwLock::new(());
     let held = hold.write();
@@ -163,13 +165,12 @@ fn granted(n_max: usize) -> (usize, Option<io::Error>) {
     })
 }
 
-/// The threads that the system counts; none where it does not say.
+/// The system's count of threads; `None` if it does not tell.
 fn n_threads() -> Option<usize> {
     fs::read_dir("/proc/self/task").ok().map(Iterator::count)
 }
 
-/// A thread counts for a moment after it has been joined: until then there is no other in its
-/// place.
+/// Waits for ended threads: the system counts a thread for a moment after it has been joined.
 fn wait_for_ended_threads(n_before: Option<usize>) {
     for _ in 0..GONE_TIME_MS {
         if n_threads() <= n_before {
@@ -179,8 +180,8 @@ fn wait_for_ended_threads(n_before: Option<usize>) {
     }
 }
 
-/// Makes one line, and an end, of panics that say that a thread was refused: libraries do not
-/// return that as an error.
+/// Turns panics about refused threads into one line and the end of the program, because libraries
+/// do not return this as an error.
 fn report_refused_threads() {
     let usual = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
@@ -188,14 +189,14 @@ fn report_refused_threads() {
         if !is_refused_thread(text) {
             return usual(info);
         }
-        // The standard library quotes what the system says.
+        // The standard library quotes the system's error.
         let why = text.split('"').nth(1).or_else(|| text.rsplit(": ").next()).unwrap_or(text);
         report(&format!("error: {}", Starved(io::Error::other(why.to_owned()))));
         std::process::exit(EXIT_STARVED.into());
     }));
 }
 
-/// The texts of tokio, and of the standard library.
+/// Recognises the texts of tokio and of the standard library.
 fn is_refused_thread(text: &str) -> bool {
     text.starts_with("OS can't spawn worker thread") || text.starts_with("failed to spawn thread")
 }

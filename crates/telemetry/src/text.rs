@@ -1,4 +1,4 @@
-//! Text of others, made fit for a terminal and a log.
+//! Makes text from strangers fit for a terminal and a log.
 
 use std::{
     borrow::Cow,
@@ -6,8 +6,8 @@ use std::{
     io::{self, Write},
 };
 
-/// Whether a character is no text: it moves the cursor, changes the order in which text
-/// is shown, or cannot be seen. (Unicode's categories Cc, Cf, Zl and Zp.)
+/// Whether a character is not printable: it moves the cursor, changes the order of text, or is
+/// invisible. (Unicode's categories Cc, Cf, Zl and Zp.)
 pub fn is_unprintable(c: char) -> bool {
     c.is_control() || is_format(c)
 }
@@ -27,16 +27,16 @@ pub fn escape(text: &str) -> Cow<'_, str> {
     escape_if(text, is_unprintable)
 }
 
-/// The same for lines of text: their ends stay, and tabs. What is JSON stays the same
-/// JSON.
+/// The same for lines of text: line ends and tabs stay, and JSON stays the same JSON.
 pub fn escape_lines(text: &str) -> Cow<'_, str> {
     escape_if(text, |c| !matches!(c, '\n' | '\t') && is_unprintable(c))
 }
 
-/// From here on a number is written with an exponent.
+/// From this number on, numbers are written with an exponent.
 const PLAIN_MAX: f64 = 1e7;
 
-/// A number with so many decimals, and never a long one: beyond ten million it has an exponent.
+/// A number with this many decimals. Beyond ten million it has an exponent, so that it is never
+/// long.
 pub fn number(value: f64, decimals: usize) -> String {
     match value.is_finite() && value.abs() >= PLAIN_MAX {
         true => format!("{value:.decimals$e}"),
@@ -44,7 +44,8 @@ pub fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A line, or several, on standard error. If that takes none there is no place left to report to.
+/// Writes one or more lines to standard error. Ignores errors, because there is no other place to
+/// report them.
 pub fn report(text: &str) {
     let _ = writeln!(io::stderr(), "{}", escape_lines(text));
 }
@@ -66,8 +67,8 @@ fn escape_if(text: &str, is_unfit: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(escaped)
 }
 
-/// Writes log lines, whose control characters the log escapes by itself, with all other
-/// unprintable characters escaped. Each line comes whole.
+/// Writes log lines with all unprintable characters escaped; the log itself escapes only control
+/// characters. Each write is a whole line.
 #[derive(Debug)]
 pub struct EscapingWriter<W>(pub W);
 

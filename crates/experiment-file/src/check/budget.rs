@@ -1,4 +1,4 @@
-//! What an experiment costs, against the [`limits`].
+//! Compares the costs of an experiment with the [`limits`].
 
 use crate::report::{Path, Report};
 use crate::{
@@ -17,9 +17,9 @@ pub(super) fn check(
     episode(config, &network, report);
 }
 
-/// Numbers that a worker keeps for a node of an encoder, beside one per substep.
+/// Numbers that a worker keeps for a node of an encoder, in addition to one per substep.
 const STATES_PER_NODE: u64 = 8;
-/// Operations of a node of an encoder in a substep: a draw costs as much.
+/// Operations of a node of an encoder in a substep, as many as for a random draw.
 const OPERATIONS_PER_NODE: u64 = 16;
 
 struct NetworkSize {
@@ -27,21 +27,21 @@ struct NetworkSize {
     n_neurons: u64,
     /// Numbers that a worker keeps for the neurons of one robot.
     n_states: u64,
-    /// Parameters of all neurons that can evolve.
+    /// Number of evolvable parameters of all neurons.
     n_neuron_genes: u64,
-    /// A, B, C and D of plastic groups.
+    /// Number of coefficients A, B, C and D of all plastic groups.
     n_learning_coefficients: u64,
     /// Numbers that a worker keeps for plasticity of one robot.
     n_learning_states: u64,
     /// Operations of plasticity per environment step.
     n_learning_operations: u64,
-    /// Weights of all receptive fields.
+    /// Number of weights of all receptive fields.
     n_encoder_weights: u64,
-    /// Weights of all decodings.
+    /// Number of weights of all decodings.
     n_decoder_weights: u64,
     /// Operations of all neurons in a substep.
     n_neuron_operations: u64,
-    /// If every possible one exists.
+    /// Number of synapses, if every possible one exists.
     n_synapses: u64,
 }
 
@@ -54,7 +54,7 @@ impl NetworkSize {
         let size_of_all = |names: &[String]| names.iter().map(size).sum::<u64>();
         let groups = topology.synapses.values();
         let model = topology.neuron_model.spec();
-        // A dynamic synapse has a delay, and a neuron's axon the spikes of nine substeps and
+        // A dynamic synapse keeps a delay; a neuron's axon keeps the spikes of nine substeps and
         // four variables of its receptors.
         let is_dynamic = u64::from(topology.synapse_model == SynapseModel::Dynamic);
         let of_synapses = 13 * is_dynamic;
@@ -105,7 +105,7 @@ impl NetworkSize {
     }
 }
 
-/// Reports a cost that exceeds its limit; `parts` are what it depends on.
+/// Reports a cost that exceeds its limit; `parts`: the places on which the cost depends.
 fn limit(cost: u64, limit: u64, what: &str, path: &Path, parts: &[&Path], report: &Report<'_>) {
     if cost > limit {
         report
@@ -124,7 +124,7 @@ fn network_size(network: &NetworkSize, report: &Report<'_>) {
     limit(n_synapses, limits::SYNAPSES, "possible synapses", &synapses, &parts, report);
 }
 
-/// What the coordinator keeps of a generation.
+/// The coordinator's costs of a generation.
 fn generation(
     config: &ExperimentConfig,
     network: &NetworkSize,
@@ -154,7 +154,7 @@ fn generation(
     }
 }
 
-/// What a worker computes and keeps for an episode.
+/// A worker's costs of an episode.
 fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>) {
     let path = Path::from(["world", "objects"]);
     let algorithm = Path::from(["algorithm"]);

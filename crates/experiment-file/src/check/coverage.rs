@@ -1,4 +1,4 @@
-//! Which query of the genotype covers which part of the network.
+//! Assigns the parts of the network to the queries of the genotype.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use crate::{
     SynapseGroupConfig, SynapseModel, SynapseSelector, TopologyConfig,
 };
 
-/// The evolvable parts of a network and who claimed them.
+/// The evolvable parts of a network, and the query that covers each.
 pub(super) struct ParameterCoverage<'a> {
     topology: &'a TopologyConfig,
     parts: Vec<Part<'a>>,
@@ -20,7 +20,7 @@ struct Part<'a> {
     owner: Option<(&'a GenotypeQuery, &'a str)>,
 }
 
-/// What a query takes as a whole or not at all.
+/// A part of the network that a query covers completely or not at all.
 #[derive(Clone, Copy)]
 enum PartKind<'a> {
     /// The weights of a group's synapses from one of its names.
@@ -81,7 +81,7 @@ impl<'a> ParameterCoverage<'a> {
         Self { topology, parts }
     }
 
-    /// Gives `query` what it asks for; reports what it cannot have.
+    /// Assigns to `query` the parts that it names; reports conflicts.
     pub(super) fn claim(
         &mut self,
         query: &'a GenotypeQuery,
@@ -122,7 +122,7 @@ impl<'a> ParameterCoverage<'a> {
         }
     }
 
-    /// How many things the last part of `query` may mean.
+    /// Number of possible meanings of the last part of `query`.
     fn n_meanings(&self, query: &GenotypeQuery) -> usize {
         let TopologyConfig { stimuli, encoding, ensembles, synapses, .. } = self.topology;
         match query {
@@ -149,7 +149,7 @@ impl<'a> ParameterCoverage<'a> {
         }
     }
 
-    /// Why the last part of `query` does not mean exactly one thing.
+    /// Why the last part of `query` does not have exactly one meaning.
     fn explain(&self, query: &GenotypeQuery) -> String {
         let TopologyConfig { stimuli, ensembles, synapses, .. } = self.topology;
         let (name, what, known): (&str, &str, Vec<&String>) = match query {

@@ -1,4 +1,4 @@
-//! Encoders: whether neurons take spikes, and whether values suit what they become.
+//! Checks encoders: neurons must take spikes, and values must fit the fields and schemes.
 
 use crate::report::{Path, Report};
 use crate::{EncodingConfig, EncodingScheme, RadialField, TopologyConfig, limits};

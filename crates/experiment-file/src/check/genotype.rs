@@ -1,4 +1,5 @@
-//! The genotype: queries that match something, once; their bounds; operators.
+//! Checks the genotype: its queries match something, and nothing twice; their bounds; the
+//! operators.
 
 use crate::report::{Path, Report};
 use crate::{
@@ -46,8 +47,7 @@ pub(super) fn check(
     }
 }
 
-/// Bounds are in order, and the values that they stand for are within the range of
-/// what they bound.
+/// Bounds are in order, and their decoded values are within the range of the parameter.
 fn bounds(
     population: &PopulationConfig,
     topology: &TopologyConfig,

@@ -1,4 +1,4 @@
-//! Plasticity: names that resolve, bounds that make sense.
+//! Checks plasticity: its names resolve, and its bounds are valid.
 
 use crate::report::{Path, Report, suggestion};
 use crate::{LearningConfig, TopologyConfig};

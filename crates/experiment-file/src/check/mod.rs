@@ -1,8 +1,8 @@
-//! Checks what holds between the parts of an experiment: names that resolve,
-//! sizes that agree, bounds of what it costs.
+//! Checks the relations between the parts of an experiment: names resolve, sizes agree, costs are
+//! within their limits.
 //!
-//! Each check names every place it relies on, so that it stays silent where one
-//! of them could not be read.
+//! Each check names every place on which it relies, so that it stays silent if one of them could
+//! not be read.
 
 mod budget;
 mod coverage;
@@ -17,9 +17,8 @@ mod world;
 use super::report::Report;
 use super::{AlgorithmDescription, ExperimentConfig};
 
-/// Reports everything that does not fit together. `algorithm`: the description of
-/// the algorithm that the file names; none if it names none, or if it is not to be
-/// checked.
+/// Reports everything that does not fit together. `algorithm`: the description of the file's
+/// algorithm; `None` if the file names none, or if the algorithm is not checked.
 pub(super) fn check(
     config: &ExperimentConfig,
     algorithm: Option<&AlgorithmDescription>,

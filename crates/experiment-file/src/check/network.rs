@@ -1,4 +1,4 @@
-//! The network in itself: names, groups, outputs and their decoding.
+//! Checks the network itself: names, groups, outputs and their decoding.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,7 +20,7 @@ pub(super) fn check(topology: &TopologyConfig, report: &Report<'_>) {
     }
 }
 
-/// Euler steps beyond a time constant would take what receptors do below zero.
+/// Euler steps longer than a time constant would make the state of receptors negative.
 fn receptors(topology: &TopologyConfig, report: &Report<'_>) {
     let Some(SynapseParams { ampa, gaba, nmda }) = topology.synapse_params else { return };
     for (receptor, key, tau) in [
@@ -38,7 +38,7 @@ fn receptors(topology: &TopologyConfig, report: &Report<'_>) {
     }
 }
 
-/// Euler steps beyond twice the time constant diverge.
+/// Euler steps longer than twice the time constant diverge.
 fn motor_tau(topology: &TopologyConfig, report: &Report<'_>) {
     let Some(tau) = topology.motor_tau.filter(|tau| *tau < topology.dt / 2.0) else { return };
     let [path, dt] = ["motor_tau", "dt"].map(|key| Path::from(["topology", key]));
@@ -57,7 +57,7 @@ fn names(topology: &TopologyConfig, report: &Report<'_>) {
     }
 }
 
-/// A network that senses nothing is rarely meant.
+/// Warns of a network without input, which is rarely intended.
 fn inputs(topology: &TopologyConfig, report: &Report<'_>) {
     let is_used = |stimulus: &String| {
         topology.synapses.values().any(|group| group.p > 0.0 && group.pre.contains(stimulus))
@@ -100,12 +100,12 @@ fn groups(topology: &TopologyConfig, report: &Report<'_>) {
     }
 }
 
-/// What a synapse can start from; the ensembles, where it can end, come first.
+/// The possible sources of a synapse; the ensembles, which are also possible targets, come first.
 fn source_names(topology: &TopologyConfig) -> impl Iterator<Item = &str> {
     topology.ensembles.keys().chain(topology.stimuli.keys()).map(String::as_str)
 }
 
-/// The indices in `known`, a beginning of [`source_names`], of what is named.
+/// The indices of names in `known`, which is a beginning of [`source_names`].
 fn resolve(
     names: &[String],
     known: &[&str],
@@ -159,7 +159,7 @@ fn outputs(topology: &TopologyConfig, report: &Report<'_>) {
     }
 }
 
-/// Every output has a decoding that yields what its actuator takes.
+/// Every output has a decoding whose values its actuator accepts.
 fn decoding(topology: &TopologyConfig, report: &Report<'_>) {
     let path = Path::from(["topology", "decoding"]);
     let outputs_path = Path::from(["topology", "outputs"]);
@@ -198,8 +198,8 @@ fn decoding(topology: &TopologyConfig, report: &Report<'_>) {
     }
 }
 
-/// Whether an actuator can act on what a decoding makes of `n` neurons. (The
-/// length of a message is the transmitter's.)
+/// Whether an actuator accepts the values that a decoding makes of `n` neurons. (The transmitter
+/// determines the length of messages.)
 fn accepts(actuator: ActuatorQuery, decoding: DecodingConfig, n: u32) -> Result<(), String> {
     use ActuatorQuery::{Led, Message, Mode, Wheels};
     use DecodingConfig::{

@@ -1,4 +1,4 @@
-//! The task: what evolves, and whether its fitness can be measured.
+//! Checks the task: its object can evolve, and its fitness can be measured.
 
 use crate::fitness::Need;
 use crate::report::{Path, Report, suggestion};
@@ -12,7 +12,7 @@ pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
     fitness_params(config, report);
 }
 
-/// Constants that are not those of the function would be without effect.
+/// Refuses constants of other fitness functions, which would have no effect.
 fn fitness_params(config: &ExperimentConfig, report: &Report<'_>) {
     let function = config.algorithm.fitness_function;
     let (given, default) = (config.algorithm.fitness_params, FitnessParams::default());

@@ -1,4 +1,4 @@
-//! The world's objects: what robots carry and suffer, where objects start.
+//! Checks the world's objects: devices and perturbations of robots, start positions.
 
 use crate::report::{Path, Report};
 use crate::{
@@ -144,7 +144,7 @@ fn braitenberg_ports(robot: &RobotConfig, path: &Path, report: &Report<'_>) {
     }
 }
 
-/// What the script senses has a range.
+/// The readings of a script sensor have a range.
 fn script_sensor(config: &ExperimentConfig, robot: &RobotConfig, path: &Path, report: &Report<'_>) {
     let Some(ScriptSensorConfig { low, high, .. }) = &robot.sensors.script_sensor else { return };
     let path = path.key("sensors").key("script_sensor");
@@ -154,7 +154,7 @@ fn script_sensor(config: &ExperimentConfig, robot: &RobotConfig, path: &Path, re
     }
 }
 
-/// There is a script that has what `path` leaves to it.
+/// The task's script has the function that `path` needs.
 fn script(config: &ExperimentConfig, function: &str, path: &Path, report: &Report<'_>) {
     if config.task.is_none() {
         report.conflict(path, &[&Path::from(["task"])], || {

@@ -1,11 +1,11 @@
 //! How an evolutionary algorithm describes itself to the experiment file.
 //!
-//! An algorithm states its name, its parameters with their domains and defaults,
-//! and its limits once, as an [`AlgorithmDescription`], next to its code in the
-//! crate `evolution`. The reader, the JSON Schema, the checks and the table in
-//! `docs/algorithms.md` all follow from the list of descriptions, which is an
-//! argument of [`ExperimentConfig::from_json`](crate::ExperimentConfig::from_json).
-//! So this crate knows no algorithm, and who only simulates needs none.
+//! An algorithm states its name, its parameters with their domains and defaults, and its limits
+//! once, as an [`AlgorithmDescription`], next to its code in the crate `evolution`. The reader,
+//! the JSON Schema, the checks and the table in `docs/algorithms.md` all follow from the list of
+//! descriptions, which is an argument of
+//! [`ExperimentConfig::from_json`](crate::ExperimentConfig::from_json). So this crate knows no
+//! algorithm, and programs that only simulate need none.
 
 mod schema;
 
@@ -13,31 +13,31 @@ use crate::Parameter;
 
 pub(crate) use schema::describe_algorithms;
 
-/// What an experiment file may say about an algorithm, and what follows from it.
+/// The description of an algorithm: its keys in experiment files, its limits, and its costs.
 #[derive(Debug, Clone, Copy)]
 pub struct AlgorithmDescription {
     /// Its name in the file, such as `"SNES"`.
     pub name: &'static str,
     /// Its name in words, as in "Separable natural evolution strategy".
     pub title: &'static str,
-    /// What it adapts from generation to generation.
+    /// The state that it adapts from generation to generation, for people.
     pub learns: &'static str,
-    /// Numbers that it keeps between generations, in terms of the genes d and the
+    /// Number of values that it keeps between generations, as a formula in the genes d and the
     /// individuals P.
     pub state: &'static str,
-    /// Of which order that is, for estimates of memory.
+    /// The order of that number, for estimates of memory.
     pub keeps: Keeps,
     /// Fewest individuals per generation, at least 1.
     pub individuals_min: u32,
-    /// How it makes use of the individuals of a generation.
+    /// The way in which it learns from the individuals of a generation.
     pub learns_from: LearnsFrom,
-    /// Most genes of all populations together; none: no limit of its own.
+    /// Most genes of all populations together; `None`: no limit of its own.
     pub genes_max: Option<u64>,
     /// In the order of the canonical form.
     pub parameters: &'static [Parameter],
 }
 
-/// The largest of what an algorithm keeps between generations.
+/// The largest part of an algorithm's state between generations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Keeps {
     /// A few vectors of genes.
@@ -51,13 +51,13 @@ pub enum Keeps {
 /// How an algorithm makes use of the individuals of a generation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LearnsFrom {
-    /// Of their ranks.
+    /// It learns from their ranks.
     Ranks,
-    /// Of their ranks, individuals being drawn in pairs, on both sides of the mean.
+    /// It learns from their ranks, and draws individuals in pairs, on both sides of the mean.
     Pairs,
 }
 
-/// So few individuals teach an algorithm next to nothing.
+/// Number of individuals below which an algorithm learns next to nothing.
 const FEW_INDIVIDUALS: u32 = 4;
 
 impl AlgorithmDescription {
@@ -66,7 +66,7 @@ impl AlgorithmDescription {
         descriptions.iter().find(|description| description.name == name)
     }
 
-    /// What speaks against a population of this size, if it is accepted at all.
+    /// A warning about an allowed but unfavourable size of the population, if there is one.
     pub fn advice(&self, population_size: u32) -> Option<String> {
         let name = self.name;
         match population_size {

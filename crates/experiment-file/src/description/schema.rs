@@ -7,8 +7,8 @@ use super::AlgorithmDescription;
 use crate::algorithm::GENETIC_KEYS;
 use crate::parameters;
 
-/// Adds the names and parameters of `algorithms` to the schema of experiment
-/// files, which has only their places.
+/// Adds the names and parameters of `algorithms` to the schema of experiment files, which has
+/// placeholders for them.
 pub(crate) fn describe_algorithms(schema: &mut Value, algorithms: &[AlgorithmDescription]) {
     let names = algorithms.iter().map(|algorithm| {
         json!({"type": "string", "const": algorithm.name, "description": algorithm.title})
@@ -29,8 +29,8 @@ pub(crate) fn describe_algorithms(schema: &mut Value, algorithms: &[AlgorithmDes
     // The parameters may stand in the population itself, too.
     if let Value::Object(population) = population {
         for (key, mut value) in algorithms.iter().flat_map(properties) {
-            // The first description is the genetic algorithm's, which uses them all. For
-            // the other algorithms, which ignore these keys, any value will do.
+            // The first description is that of the genetic algorithm, which uses all these keys.
+            // The other algorithms ignore them, so they accept any value.
             if GENETIC_KEYS.contains(&key.as_str()) {
                 value = json!({"description": value["description"]});
             }

@@ -1,10 +1,9 @@
-//! Neuron models: which there are, and what an experiment file says of each.
+//! The neuron models, and the keys of each in experiment files.
 //!
-//! A model has its parameters, queries and costs in a [`NeuronModelSpec`]. The
-//! reader, the JSON Schema, the queries of the genotype, the budget and the canonical
-//! form all follow from it, and so does what `sim-core` decodes genes into. To add a
-//! model: a file beside `rate`, a variant of [`NeuronModel`] here, and in `sim-core`
-//! the model's dynamics.
+//! A model has its parameters, queries and costs in a [`NeuronModelSpec`]. The reader, the JSON
+//! Schema, the queries of the genotype, the budget and the canonical form all follow from it, and
+//! so does the decoding of genes in `sim-core`. To add a model, add a file beside `rate`, a
+//! variant of [`NeuronModel`] here, and the model's dynamics in `sim-core`.
 
 mod adex;
 mod exp_lif;
@@ -46,7 +45,7 @@ pub(super) const VOLTAGE: [f64; 2] = [-200.0, 200.0];
 /// Time constants of spiking neurons, ms.
 pub(super) const TIME: [f64; 2] = [0.01, 10_000.0];
 
-/// What an experiment file can say of the neurons of a model, and what they cost.
+/// The specification of a neuron model: its keys in experiment files, and its costs.
 #[derive(Debug)]
 pub struct NeuronModelSpec {
     /// Its names in files; the canonical form uses the first.
@@ -56,29 +55,29 @@ pub struct NeuronModelSpec {
     pub is_spiking: bool,
     /// The parameters of a neuron, in the order of the canonical form.
     pub parameters: &'static [NeuronParameter],
-    /// The activation function of an ensemble that names none; none for a model
-    /// whose neurons have no activation function.
+    /// The default activation function of an ensemble; `None` for a model whose neurons have
+    /// none.
     pub activation: Option<Activation>,
-    /// Numbers that a worker keeps for a neuron of one robot, for the budget.
+    /// Number of values that a worker keeps per neuron and robot, for the budget.
     pub states_per_neuron: u64,
-    /// Operations of a neuron in a network substep, for the budget; a synapse has 1.
+    /// Operations per neuron and network substep, for the budget; a synapse has 1.
     pub operations_per_neuron: u64,
 }
 
 /// A parameter of a model's neurons.
 #[derive(Debug, Clone, Copy)]
 pub struct NeuronParameter {
-    /// What files say of it.
+    /// Its key, domain and default in files.
     pub parameter: Parameter,
     /// Other names in queries.
     pub aliases: &'static [&'static str],
-    /// What a gene's bounds mean; none if the parameter cannot evolve.
+    /// The scale of a gene's bounds; `None` if the parameter cannot evolve.
     pub gene: Option<GeneScale>,
     /// Whether an Euler step longer than twice its value makes the network diverge.
     pub is_time_constant: bool,
 }
 
-/// From a number between a query's `min_vals` and `max_vals` to a value.
+/// Converts a number between a query's `min_vals` and `max_vals` to a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GeneScale {
     /// The number itself.
@@ -95,7 +94,7 @@ impl NeuronModel {
     pub const ALL: [Self; 6] =
         [Self::Rate, Self::Lif, Self::ExpLif, Self::AdEx, Self::Izhikevich, Self::MorrisLecar];
 
-    /// What files say of it, and what it costs.
+    /// Its specification.
     pub fn spec(self) -> &'static NeuronModelSpec {
         match self {
             Self::Rate => &rate::SPEC,
@@ -128,7 +127,7 @@ impl NeuronModel {
         Self::ALL.iter().flat_map(|model| model.spec().names).copied().collect()
     }
 
-    /// The model of a name.
+    /// The model of this name.
     pub(super) fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|model| model.spec().names.contains(&name))
     }
@@ -147,7 +146,7 @@ impl NeuronModelSpec {
         self.parameters.iter().find(|parameter| parameter.name() == name)
     }
 
-    /// What files say of the parameters.
+    /// The parameters' keys, domains and defaults in files.
     pub(super) fn table(&self) -> Vec<Parameter> {
         self.parameters.iter().map(|parameter| parameter.parameter).collect()
     }
@@ -179,7 +178,7 @@ impl GeneScale {
         }
     }
 
-    /// How the value comes from the number, for people to read.
+    /// The conversion of a number to a value, for people.
     pub(super) fn formula(self, number: f64) -> String {
         match self {
             Self::Linear => number.to_string(),
@@ -276,7 +275,7 @@ impl NeuronParameter {
         self.parameter.default.value().and_then(|value| value.number()).unwrap_or_default()
     }
 
-    /// Values that a neuron can have, from a file or from a gene.
+    /// Range of its values, from a file or from a gene.
     pub fn range(&self) -> RangeInclusive<f64> {
         match self.parameter.domain {
             Domain::Between(min, max) => min..=max,

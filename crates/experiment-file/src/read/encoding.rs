@@ -9,7 +9,7 @@ use crate::{EncodingConfig, EncodingScheme, NamedMap, ReceptiveField, StimulusCo
 
 const IDENTITY: &str = "IdentityEncoding";
 const SCHEMES: [&str; 4] = [IDENTITY, "LIF_Encoding", "PoissonRateCoding", "RankOrderCoding"];
-/// The encoders; stimuli that act as they are have none.
+/// The encoders; stimuli that act unchanged have none.
 pub(super) fn encodings(
     o: &mut Object<'_>,
     stimuli: &NamedMap<StimulusConfig>,
@@ -26,7 +26,7 @@ pub(super) fn encodings(
     entries.into_iter().filter_map(|(name, entry)| Some((name, entry?))).collect()
 }
 
-/// None of the identity, or of what is unreadable.
+/// `None` for the identity, or if the entry is unreadable.
 fn encoding(o: &mut Object<'_>, time_scale: u32) -> Option<EncodingConfig> {
     let scheme = match o.required("scheme").one_of(&SCHEMES, &[]) {
         Some("LIF_Encoding") => EncodingScheme::Lif,
@@ -41,7 +41,7 @@ fn encoding(o: &mut Object<'_>, time_scale: u32) -> Option<EncodingConfig> {
             return None;
         }
     };
-    // What a node yields far from its centre and there.
+    // The values of a node far from its centre and at it.
     let values = match scheme {
         EncodingScheme::RankOrder => [1.0, f64::from(time_scale)],
         EncodingScheme::Lif | EncodingScheme::PoissonRate => [0.0, 1.0],

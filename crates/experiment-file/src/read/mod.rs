@@ -1,6 +1,5 @@
-//! Reads experiment files: text -> syntax tree -> values. Each stage reports all
-//! it finds; nothing is accepted in part. How the values relate to each other is
-//! for `check` to see.
+//! Reads experiment files: text -> syntax tree -> values. Each stage reports all problems; no
+//! file is accepted in part. `check` then compares the values with each other.
 
 mod algorithm;
 mod encoding;
@@ -25,14 +24,14 @@ use super::{AlgorithmDescription, ExperimentConfig};
 /// The algorithms that a file may name.
 #[derive(Clone, Copy)]
 pub(super) enum Algorithms {
-    /// These.
+    /// The described algorithms.
     Described(&'static [AlgorithmDescription]),
     /// Any: the file is a canonical form whose algorithm was checked before.
     Unchecked,
 }
 
-/// The experiment of a syntax tree. What is unreadable is reported, and a
-/// placeholder stands in its place.
+/// Reads the experiment of a syntax tree. Reports unreadable values, and puts placeholders in
+/// their places.
 pub(super) fn read<'a>(
     report: &'a Report<'a>,
     root: &'a Value<'a>,
@@ -46,7 +45,7 @@ pub(super) fn read<'a>(
 }
 
 fn experiment(o: &mut Object<'_>, default_name: &str, algorithms: Algorithms) -> ExperimentConfig {
-    // Tells an editor where the schema is.
+    // `$schema` tells an editor where the schema is.
     o.optional("$schema").map(Node::string);
     let name = o.optional("name").map(Node::name);
     let checkpoint = o.optional("checkpoint_file").filter(|node| !node.is_null()).map(Node::name);
@@ -78,7 +77,7 @@ fn experiment(o: &mut Object<'_>, default_name: &str, algorithms: Algorithms) ->
 }
 
 impl Algorithms {
-    /// The description of the algorithm of this name, if it is to be checked.
+    /// The description of the algorithm of this name, if algorithms are checked.
     pub(super) fn find(self, name: &str) -> Option<&'static AlgorithmDescription> {
         match self {
             Self::Described(algorithms) => AlgorithmDescription::find(algorithms, name),

@@ -1,4 +1,4 @@
-//! From text to a syntax tree that knows where everything stands.
+//! Parses text into a syntax tree that knows the place of every value.
 
 use jsonc_parser::ast::Value;
 use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
@@ -13,7 +13,7 @@ pub(crate) fn parse(text: &str) -> Result<Value<'_>, ConfigError> {
         let message = format!("the file has {} bytes, the limit is {limit}", text.len());
         return Err(syntax_error(None, message));
     }
-    // The parser recurses, and bounds that only by half a megabyte of stack.
+    // The parser recurses, and its only own bound is half a megabyte of stack.
     let depth = nesting(text);
     if depth > limits::NESTING {
         let limit = limits::NESTING;
@@ -30,8 +30,8 @@ pub(crate) fn parse(text: &str) -> Result<Value<'_>, ConfigError> {
     let Some(tree) = tree else {
         return Err(syntax_error(Some(1), "the file is empty".to_owned()));
     };
-    // It is made for dialects and stays lenient in corners, such as control
-    // characters in strings; what is JSON is decided here.
+    // The parser is made for dialects, and accepts some invalid JSON, such as control characters
+    // in strings; this check is strict.
     if let Err(error) = serde_json::from_str::<IgnoredAny>(text) {
         let message = error.to_string();
         let place = format!(" at line {} column {}", error.line(), error.column());
@@ -55,8 +55,8 @@ const STRICT: ParseOptions = ParseOptions {
     allow_extended_string_escapes: false,
 };
 
-/// How deep the lists and objects of a JSON text nest; of any other text, at
-/// least how deep a parser can get before it notices.
+/// The nesting depth of lists and objects in a JSON text; for any other text, at least the depth
+/// that a parser can reach before it fails.
 fn nesting(text: &str) -> usize {
     let (mut depth, mut deepest) = (0_usize, 0);
     let mut bytes = text.bytes();
@@ -66,7 +66,7 @@ fn nesting(text: &str) -> usize {
                 while let Some(byte) = bytes.next() {
                     match byte {
                         b'"' => break,
-                        // What is escaped may be a quote.
+                        // An escaped character may be a quote.
                         b'\\' => drop(bytes.next()),
                         _ => {}
                     }

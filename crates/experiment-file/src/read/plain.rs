@@ -1,13 +1,14 @@
-//! What people may write in a JSON file beside JSON: comments, and commas after the last element.
+//! Removes the extensions of JSON that files may use: comments, and commas after the last
+//! element.
 
 use std::borrow::Cow;
 
-/// The same text without comments and trailing commas: spaces stand in their place, so that
-/// everything else keeps its line and its byte.
+/// The same text with spaces in place of comments and trailing commas, so that everything else
+/// keeps its line and its byte.
 pub fn plain(text: &str) -> Cow<'_, str> {
     let bytes = text.as_bytes();
     let mut blanks = Vec::new();
-    // A comma after which nothing has come so far but white space and comments.
+    // A comma with only white space and comments after it so far.
     let mut comma = None;
     // The latest byte that is neither white space nor in a comment.
     let mut last = b'[';
@@ -26,7 +27,7 @@ pub fn plain(text: &str) -> Cow<'_, str> {
             }
             (b'/', Some(b'*')) => {
                 let Some(n) = bytes[at + 2..].windows(2).position(|pair| pair == b"*/") else {
-                    // It has no end, which is for the parser to say.
+                    // The comment has no end, which the parser reports.
                     return Cow::Borrowed(text);
                 };
                 blanks.push(at..at + n + 4);
@@ -59,7 +60,7 @@ pub fn plain(text: &str) -> Cow<'_, str> {
     Cow::Owned(String::from_utf8(plain).expect("whole characters became spaces"))
 }
 
-/// Behind the string that begins there.
+/// The position after the string that begins at `start`.
 fn end_of_string(bytes: &[u8], start: usize) -> usize {
     let mut at = start + 1;
     while at < bytes.len() {

@@ -11,12 +11,12 @@ use crate::{
 /// How the parameters of a population are read.
 #[derive(Clone, Copy)]
 pub(super) enum ParamsReader {
-    /// By this description.
+    /// By the algorithm's description.
     Of(&'static AlgorithmDescription),
-    /// Kept as they are: they were checked before.
+    /// They are kept unchanged, because they were checked before.
     Unchecked,
-    /// Not at all: the algorithm's name is unreadable, so nobody can tell which
-    /// parameters are right.
+    /// They are skipped, because the algorithm's name is unreadable, which determines the
+    /// parameters.
     Skip,
 }
 
@@ -73,11 +73,11 @@ fn params_of(o: &mut Places<'_, '_>, algorithm: &'static AlgorithmDescription) -
     if let Some(encoding) = o.optional("encoding") {
         encoding.one_of(&["real"], &[]);
     }
-    // The original fills these in for every algorithm.
+    // The original simulator fills these in for every algorithm.
     for key in GENETIC_KEYS.into_iter().filter(|key| !algorithm.has(key)) {
         o.ignored(key, "only the genetic algorithm has it");
     }
-    // The canonical form leaves what the algorithm computes to it.
+    // The canonical form omits values that the algorithm computes.
     parameters::params(o, algorithm.parameters, Semantics::Thesis, &[])
 }
 

@@ -55,7 +55,7 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
     }
 }
 
-/// The model, which a file may name in two places; none if it is unreadable.
+/// The model, which a file may name in two places; `None` if it is unreadable.
 fn neuron_model(o: &mut Object<'_>) -> Option<NeuronModel> {
     let named =
         |node: Node<'_>| node.one_of(&NeuronModel::names(), &[]).and_then(NeuronModel::named);
@@ -69,13 +69,13 @@ fn neuron_model(o: &mut Object<'_>) -> Option<NeuronModel> {
     outer.or(inner).unwrap_or(Some(NeuronModel::default()))
 }
 
-/// What depends on nothing else.
+/// Reads an object that depends on no other part.
 fn plain<T: Parameters>(o: &mut Object<'_>) -> T {
     parameters::read(o, Semantics::Thesis, &[])
 }
 
-/// `model`: none if it is unreadable; then nobody can tell which parameters are
-/// right.
+/// Reads an ensemble. `model`: `None` if it is unreadable, so that the allowed parameters are
+/// unknown.
 fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
     let ensemble: EnsembleConfig = plain(o);
     let Some(spec) = model.map(NeuronModel::spec) else {
@@ -103,7 +103,7 @@ fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
     EnsembleConfig { activation: outer.or(inner).or(spec.activation), params, ..ensemble }
 }
 
-/// None of static synapses.
+/// `None` for static synapses.
 fn synapse_params(o: &mut Object<'_>, model: SynapseModel) -> Option<SynapseParams> {
     if model == SynapseModel::Static {
         o.ignored("synapse_params", "static synapses have no parameters");

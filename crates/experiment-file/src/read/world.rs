@@ -52,14 +52,14 @@ fn light_source(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> L
     }
 }
 
-/// A name, an object of `name` and `params`, or null for none.
+/// Reads a controller of lights: a name, an object of `name` and `params`, or null.
 fn light_controller(node: Node<'_>, semantics: Semantics) -> LightController {
     let choice = Choice::any::<LightController>(&[]);
     let read = |o: &mut Object<'_>| parameters::read_kind(o, &choice, semantics, &[]);
     node.or_null(|node| node.object_or_name(read)).flatten().unwrap_or(LightController::Static {})
 }
 
-/// `color`: of food areas and nests, which have no other one.
+/// Reads a ground area. `color`: the fixed colour of food areas and nests.
 fn ground_area(o: &mut Object<'_>, center: [f64; 2], color: Option<&str>) -> GroundAreaConfig {
     GroundAreaConfig {
         num_instances: o.required("num_instances").u32(1..=limits::STATIC_OBJECTS),
@@ -86,7 +86,7 @@ fn position_initializers(o: &mut Object<'_>, center: [f64; 2]) -> PositionInitia
     })
 }
 
-/// `center`: of the world, the default centre of arrangements.
+/// Reads start positions. `center`: of the world, the default centre of arrangements.
 pub(super) fn positions(node: Node<'_>, center: [f64; 2]) -> Initializer {
     let choice = Choice::any::<Initializer>(&["grid_graph"]);
     let centers = [("center", center.into()), ("initial_pos", center.into())];
@@ -95,7 +95,7 @@ pub(super) fn positions(node: Node<'_>, center: [f64; 2]) -> Initializer {
     node.object(read).unwrap_or(Initializer::Fixed { values: vec![vec![0.0; 2]] })
 }
 
-/// Headings; by default uniform on the circle.
+/// Reads headings; by default uniform on the circle.
 pub(super) fn orientations(node: Option<Node<'_>>) -> Initializer {
     const FULL_TURN: f64 = std::f64::consts::TAU;
     let Some(node) = node else {

@@ -1,5 +1,5 @@
-//! Collects the problems of a file and finds the place of each. The reader and
-//! the checks both write to it.
+//! Collects the problems of a file, and finds the place of each. Both the reader and the checks
+//! write to it.
 
 mod names;
 mod path;
@@ -36,8 +36,8 @@ impl fmt::Display for Excerpt<'_> {
     }
 }
 
-/// What is wrong; or a function that finds the words, called only if there is
-/// room for them, for those that are costly to find.
+/// The text of a problem; or, for costly texts, a function that makes it, called only if there is
+/// room.
 pub(crate) trait Message {
     fn text(self) -> String;
 }
@@ -60,7 +60,7 @@ impl<F: FnOnce() -> String> Message for F {
     }
 }
 
-/// Everything that is remarkable about a file.
+/// The problems and warnings of a file.
 pub(crate) struct Report<'a> {
     root: &'a Value<'a>,
     text: &'a str,
@@ -73,7 +73,7 @@ struct Remarks {
     warnings: Vec<Located>,
     /// Problems beyond [`limits::PROBLEMS`].
     n_omitted: usize,
-    /// Places whose value stands for an unreadable one.
+    /// Places whose value is a placeholder for an unreadable one.
     broken: Vec<Path>,
 }
 
@@ -87,7 +87,7 @@ impl<'a> Report<'a> {
         Self { root, text, remarks: RefCell::default() }
     }
 
-    /// Reports what is wrong at `path`, and marks the place as broken.
+    /// Reports a problem at `path`, and marks the place as broken.
     pub(crate) fn problem(&self, path: &Path, message: impl Message) {
         if self.has_room() {
             let (shown, offset) = self.locate(path);
@@ -96,15 +96,15 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// Reports what is wrong with the text at `offset`, which is about `path`.
+    /// Reports a problem of the text at `offset`, which belongs to `path`.
     pub(crate) fn problem_at(&self, path: &Path, offset: usize, message: impl Message) {
         if self.has_room() {
             self.add(path, offset, message.text());
         }
     }
 
-    /// Reports what is wrong at `path` in relation to `others`, unless one of
-    /// these places is broken: then it may merely follow from that.
+    /// Reports a conflict of `path` with `others`, unless one of these places is broken, which
+    /// may be the cause.
     pub(crate) fn conflict(&self, path: &Path, others: &[&Path], message: impl Message) {
         let follows = {
             let remarks = self.remarks.borrow();

@@ -1,4 +1,4 @@
-//! Names: which ones are allowed, and what to say about an unknown one.
+//! Names: the allowed ones, and suggestions for unknown ones.
 
 use super::Excerpt;
 use crate::limits;
@@ -17,8 +17,8 @@ pub(crate) fn check_name(name: &str) -> Result<(), String> {
     }
 }
 
-/// What is wrong with a name that is none of `expected`; `unsupported` are those
-/// that the original simulator knows and this one does not.
+/// The message for a name that is not among `expected`. `unsupported`: names that only the
+/// original simulator knows.
 pub(crate) fn unknown_name(name: &str, expected: &[&str], unsupported: &[&str]) -> String {
     if unsupported.contains(&name) {
         format!("not supported: `{name}`; {}", known_names(expected))
@@ -29,7 +29,7 @@ pub(crate) fn unknown_name(name: &str, expected: &[&str], unsupported: &[&str]) 
 
 /// The nearest known name, or all of them if none is near.
 pub fn suggestion<S: AsRef<str>>(name: &str, known: &[S]) -> String {
-    // A longer one resembles nothing, and the measure takes quadratic time.
+    // A longer name resembles no known one, and the comparison takes quadratic time.
     let comparable = name.len() <= limits::NAME_CHARS;
     let name = name.to_lowercase();
     let similarity = |known: &S| strsim::jaro_winkler(&name, &known.as_ref().to_lowercase());
@@ -43,7 +43,7 @@ pub fn suggestion<S: AsRef<str>>(name: &str, known: &[S]) -> String {
 }
 
 fn known_names<S: AsRef<str>>(known: &[S]) -> String {
-    /// More do not help.
+    /// Most names to list.
     const SHOWN: usize = 16;
     let quoted = known.iter().take(SHOWN).map(|name| format!("`{}`", Excerpt(name.as_ref())));
     let quoted: Vec<String> = quoted.collect();

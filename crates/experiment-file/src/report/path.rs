@@ -5,8 +5,7 @@ use std::{fmt, iter};
 
 use super::Excerpt;
 
-/// A place in the file, from the root. Cheap to extend: every value that is
-/// read has one.
+/// A place in the file, from the root. Cheap to extend, because every value has one.
 #[derive(Clone, Default)]
 pub(crate) struct Path(Option<Rc<Step>>);
 
@@ -36,8 +35,8 @@ impl Path {
         self.join(Segment::Index(index))
     }
 
-    /// The set of keys of the map at this place; what relies on it does not
-    /// rely on the values.
+    /// The set of keys of the map at this place, for checks that rely on the keys and not on the
+    /// values.
     pub(crate) fn keys(&self) -> Self {
         self.join(Segment::Keys)
     }

@@ -1,5 +1,5 @@
-//! The reference in `docs/experiment-files.md` is generated from the schema. After a
-//! change, write it anew: `UPDATE_DOCS=1 cargo test -p experiment-file documentation`.
+//! The schema generates the reference in `docs/experiment-files.md`. After a change, update it:
+//! `UPDATE_DOCS=1 cargo test -p experiment-file documentation`.
 
 use std::{env, fmt::Write as _, fs};
 
@@ -15,7 +15,7 @@ const END: &str = "<!-- end: reference -->";
 /// Keys of a population that do not depend on the algorithm; `docs/algorithms.md` has
 /// the others.
 const OF_POPULATION: [&str; 4] = ["objects", "min_vals", "max_vals", "params"];
-/// What the schema says of keys that concern the original simulator alone.
+/// The schema's description of keys that concern only the original simulator.
 const IGNORED: &str = "Accepted and ignored.";
 
 /// Parts of the schema in the order of a file: each with its heading.
@@ -129,7 +129,7 @@ impl Schema {
         text
     }
 
-    /// A row per name that may stand there, with its parameters.
+    /// A row per variant, with its parameters.
     fn variants(&self, variants: &[Value]) -> String {
         let mut text = "| name | parameters | |\n|---|---|---|\n".to_owned();
         for variant in variants {
@@ -241,7 +241,7 @@ fn without_default(meaning: &str, default: &str) -> String {
     })
 }
 
-/// How GitHub names a heading in an address.
+/// The anchor of a heading on GitHub.
 fn anchor(heading: &str) -> String {
     let lower = heading.to_lowercase();
     let kept = lower.chars().filter(|c| c.is_alphanumeric() || " _-".contains(*c));

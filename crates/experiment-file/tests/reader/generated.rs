@@ -1,4 +1,4 @@
-//! Properties of very many files.
+//! Properties of many generated files.
 
 use std::{env, thread};
 
@@ -8,11 +8,11 @@ use super::generator::{Dice, damage, experiment, spiking_experiment};
 use super::{accept, read};
 use sim_core::{Simulation, StepRecord};
 
-/// Damaged variants of each file that is right.
+/// Number of damaged variants of each valid file.
 const N_VARIANTS: u64 = 20;
 
-/// Number of files that are right: `SWARM_TEST_FILES`, 150 without it. `.ci/run` takes
-/// 5,000, which is half a minute of CPU.
+/// Number of valid files: `SWARM_TEST_FILES`, by default 150. `.ci/run` uses 5,000, which takes
+/// half a minute of CPU.
 fn n_files() -> u64 {
     let text = env::var("SWARM_TEST_FILES").unwrap_or_else(|_| "150".to_owned());
     text.parse().unwrap_or_else(|_| panic!("SWARM_TEST_FILES is {text}, not a number"))
@@ -66,8 +66,8 @@ fn n_accepted_variants(index: u64) -> u64 {
     n_accepted
 }
 
-/// Compiling may still refuse what only it can find, such as a query of a group
-/// whose synapses all happen not to exist.
+/// Compiling may still refuse a file for problems that only it can find, such as a query of a
+/// group in which no synapse happens to exist.
 #[test]
 fn accepted_files_can_be_simulated() {
     let (mut n_simulated, n) = (0, 1_100);
@@ -85,7 +85,7 @@ fn accepted_files_can_be_simulated() {
     assert!(n_simulated >= 1_000, "{n_simulated} of {n}");
 }
 
-/// Whatever the parameters and genes within their ranges, and whatever is learned.
+/// For all parameters and genes within their ranges, and with plasticity.
 #[test]
 fn no_accepted_network_of_spiking_neurons_ends_up_in_nan() {
     let (mut n_simulated, mut n_learning, mut n_encoded, mut n_voltages) = (0, 0, 0, 0);

@@ -100,8 +100,8 @@ fn read(text: &str) -> Result<(ExperimentConfig, Vec<Problem>), ConfigError> {
     ExperimentConfig::from_json(text, "default", ALGORITHMS)
 }
 
-/// The configuration of a text that must be right, without warnings, unless it is of
-/// inputs that the network does not get, or asks for a unit.
+/// The configuration of a text that must be valid. It may have warnings only about unused inputs
+/// or about units.
 fn accept(text: &str) -> ExperimentConfig {
     match read(text) {
         Ok((config, mut warnings)) => {
@@ -114,7 +114,7 @@ fn accept(text: &str) -> ExperimentConfig {
     }
 }
 
-/// The problems of a text that must be wrong, as people see them.
+/// The problems of a text that must be refused, as people see them.
 fn refuse(text: &str) -> String {
     match read(text) {
         Ok(_) => panic!("accepted\n{text}"),

@@ -1,5 +1,5 @@
-//! What files of the original simulator mean: its defaults, its constants, and keys that steer it
-//! alone.
+//! The meaning of files of the original simulator: its defaults, its constants, and keys that
+//! concern only it.
 
 use std::f64::consts::PI;
 
@@ -44,7 +44,7 @@ fn the_semantics_of_the_original_are_other_defaults() {
     assert_eq!(lamp(&config).params.range, 150.0);
     let orbit = OrbitConfig { angle_step: 0.013, radius_step: Some(1.0), ..Default::default() };
     assert_eq!(lamp(&config).controller, LightController::LightOrbitController(orbit));
-    // The canonical form says it without the word.
+    // The canonical form has the values without the key `semantics`.
     let canonical = config.to_canonical_json();
     assert!(!canonical.contains("semantics"));
     assert_eq!(accept(&canonical), config);

@@ -1,5 +1,5 @@
-//! Reader and schema say the same of every parameter, of whatever kind of thing it is: both
-//! follow from its one declaration.
+//! Reader and schema agree on every parameter of every object, because both follow from one
+//! declaration.
 
 use std::collections::BTreeSet;
 
@@ -11,21 +11,21 @@ use super::{BASE, read};
 use evolution::ALGORITHMS;
 use experiment_file::{NeuronModel, json_schema};
 
-/// Files whose parameters are probed, each parameter in the first one that has its object.
+/// Number of files to probe; each parameter is probed in the first file that has its object.
 const N_FILES: u64 = 150;
 
 /// One key of an object of a file.
 struct Probe {
-    /// The object's kind, and the key: what is probed once.
+    /// The object's kind, and the key; each pair is probed once.
     parameter: (String, String),
-    /// The object in the file, and how problems name it.
+    /// The object's place in the file, and in the words of problems.
     pointer: String,
     path: String,
-    /// What the schema says of the key; none: the schema has no such key.
+    /// The schema of the key; `None` if the schema lacks it.
     schema: Option<Value>,
 }
 
-/// The keys of all objects of a file, of those that it has and of those that it leaves out.
+/// The keys of all objects of a file, present and omitted.
 struct Walk<'a> {
     root: &'a Value,
     file: &'a Value,
@@ -33,7 +33,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// The alternative of the schema that the reader goes by.
+    /// The alternative of the schema that the reader uses.
     fn chosen(&self, kind: &str, variants: &[Value], value: &Value) -> Option<usize> {
         match kind {
             "EnsembleConfig.params" => {
@@ -103,7 +103,7 @@ impl Walk<'_> {
     }
 }
 
-/// The file with another value of a key; without one, without the key.
+/// The file with another value of a key; `None` removes the key.
 fn changed(file: &Value, probe: &Probe, value: Option<&Value>) -> Value {
     let mut file = file.clone();
     let object = file.pointer_mut(&probe.pointer).and_then(Value::as_object_mut).unwrap();
@@ -114,7 +114,7 @@ fn changed(file: &Value, probe: &Probe, value: Option<&Value>) -> Value {
     file
 }
 
-/// Whether the reader refuses the value of the key for itself, not for what else is in the file.
+/// Whether the reader refuses the value of the key itself, not a conflict with other values.
 fn is_refused(file: &Value, path: &str) -> bool {
     let Err(error) = read(&file.to_string()) else { return false };
     let of_itself =
@@ -137,8 +137,8 @@ fn candidates(schema: &Value) -> Vec<Value> {
     values
 }
 
-/// Alternatives have names or types of their own; what they say of an inner value is probed
-/// there.
+/// Whether a schema is plain. Alternatives have their own names or types, and their inner values
+/// are probed there.
 fn is_plain(schema: &Value) -> bool {
     ["string", "number", "integer", "boolean"].iter().any(|kind| schema["type"] == *kind)
         && schema["pattern"].is_null()
@@ -152,8 +152,9 @@ fn the_reader_refuses_a_value_of_a_parameter_if_the_schema_does() {
     let (mut n_refused, mut n_accepted) = (0, 0);
     for file in files() {
         for probe in probes(&root, &file) {
-            // A population may have the parameters of its algorithm itself; of which one, no
-            // schema tells. What has a position tells how many components there are.
+            // A population may contain the parameters of its algorithm directly, and no schema
+            // tells of which algorithm. An object with a position determines the number of
+            // components.
             let of_itself = probe.parameter.0 != "PopulationConfig"
                 && probe.parameter.1 != "size"
                 && probe.schema.as_ref().is_none_or(is_plain);

@@ -1,4 +1,4 @@
-//! What a wrong file hears: every problem, where it is, what would be right.
+//! The answers to wrong files: every problem, its place, and the allowed values.
 
 use super::{BASE, accept, edited, refuse};
 use evolution::ALGORITHMS;
@@ -19,7 +19,7 @@ fn one_mistake_has_one_answer() {
     }
 }
 
-/// An edit of the base, and the exact words it earns.
+/// Edits of the base, each with the exact message that it gets.
 #[rustfmt::skip]
 const MISTAKES: &[(&str, &str, &str)] = &[
     // Semantics.
@@ -107,7 +107,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""LIGHT": {"n": 6"#, r#""H": {"n": 6"#,
      "line 11: topology.ensembles.H: a stimulus has the same name\n\
       line 24: topology.synapses.in.pre[1]: no ensemble or stimulus is named `LIGHT`; known: `H`, `OUT_MSG`, `OUT_LED`, `OUT_MODE`, `OUT_WHEELS`, `MSG`, `H`"),
-    // What the original knows and this does not.
+    // Features that only the original simulator has.
     (r#""neuron_model": "rate_model""#, r#""neuron_model": "rate_model", "synapse_model": "dynamic_synapse""#,
      "line 9: topology.synapse_model: dynamic synapses need neurons that spike"),
     (r#"{"scheme": "IdentityEncoding"}"#, r#"{"scheme": "PoissonRateCoding"}"#,
@@ -383,8 +383,7 @@ const SPIKING_MISTAKES: &[(&str, &str, &str)] = &[
      "line 65: algorithm.populations.p1.objects[5]: covers nothing that can evolve"),
 ];
 
-/// No problem hides another, and none is reported that merely follows from
-/// another.
+/// No problem hides another, and consequences of a problem are not reported.
 #[test]
 fn everything_wrong_is_reported_at_once() {
     let text = edited_often(&[

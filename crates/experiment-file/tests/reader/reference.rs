@@ -1,6 +1,6 @@
-//! Files of the original simulator, accepted unchanged. They are not part of the project:
-//! where they are absent, these tests say so and pass. Files of our own, with every key that
-//! those have, are read everywhere.
+//! Files of the original simulator, accepted unchanged. They are not part of the project: if they
+//! are absent, these tests say so and pass. Files of our own with all their keys are tested
+//! everywhere.
 
 use std::{collections::BTreeSet, env, fs, io::Write as _};
 
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::{defaults, read};
 use experiment_file::{ExperimentConfig, FitnessFunction};
 
-/// Where the files are, unless `SWARM_REFERENCE` names another folder.
+/// The default folder of the files, which `SWARM_REFERENCE` replaces.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference");
 const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs");
 
@@ -19,7 +19,7 @@ fn text(file: &str) -> Option<String> {
     let path = format!("{folder}/{file}");
     let text = fs::read_to_string(&path);
     if text.is_err() {
-        // Past the capture of a test's output; `.ci/run` lists these lines.
+        // Bypasses the capture of a test's output, because `.ci/run` lists these lines.
         let _ = std::io::stderr().write_all(format!("\nSKIPPED: {path} is absent\n").as_bytes());
     }
     text.ok()
@@ -35,7 +35,7 @@ fn reference(file: &str) -> Option<(ExperimentConfig, Vec<String>)> {
     text(file).map(|text| accepted(&text))
 }
 
-/// A shipped file as the original simulator would have it, with its keys.
+/// A shipped file rewritten with the keys of the original simulator.
 fn in_the_manner_of_the_original(file: &str) -> Value {
     let text = fs::read_to_string(format!("{SHIPPED}/{file}")).unwrap();
     let mut file: Value = serde_json::from_str(&text).unwrap();
@@ -57,7 +57,7 @@ fn in_the_manner_of_the_original(file: &str) -> Value {
     file
 }
 
-/// All keys of a file but those that its author chooses.
+/// All keys of a file, except names that its author chooses.
 fn keys(file: &Value) -> BTreeSet<String> {
     const MAPS_OF_NAMES: [&str; 8] = [
         "stimuli",

@@ -60,7 +60,7 @@ fn unknown_keys_missing_keys_and_wrong_types_do_not_fit_the_schema() {
     }
 }
 
-/// Whatever the reader accepts fits; so what does not fit is refused.
+/// Every accepted file fits the schema, so the reader refuses every file that does not fit.
 #[test]
 fn what_the_reader_accepts_fits_the_schema() {
     let schema = schema();

@@ -18,7 +18,7 @@ pub(super) fn spiking() -> Vec<(String, String)> {
     files_of("../../configs/spiking")
 }
 
-/// Tasks of the thesis as its Python simulator has them.
+/// Tasks of the thesis with the settings of its Python simulator.
 fn original() -> Vec<(String, String)> {
     files_of("../../configs/original")
 }
@@ -41,7 +41,8 @@ fn shipped_files_are_accepted_without_warnings_under_their_own_names() {
     }
 }
 
-/// Three tasks, each with two neuron models, and with trials and population of the rate neurons'.
+/// Three tasks, each with two neuron models, and with the trials and population of its file with
+/// rate neurons.
 #[test]
 fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
     let rate = shipped();
@@ -70,7 +71,7 @@ fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
     assert_eq!(spiking.len(), 8);
 }
 
-/// They differ from their tasks' files in the network alone.
+/// They differ from the files of their tasks only in the network.
 #[test]
 fn encoders_and_plasticity_are_shipped() {
     let spiking = spiking();
@@ -118,7 +119,7 @@ fn every_task_is_shipped_for_the_ga_and_for_snes() {
     assert_eq!(shipped.len(), 2 * tasks.len() + 1);
 }
 
-/// A reader of the file sees the constants, whatever the defaults are.
+/// People who read the file see the constants without knowing the defaults.
 #[test]
 fn shipped_files_state_every_constant_of_sensors_and_actuators() {
     for (stem, text) in shipped().into_iter().chain(spiking()) {

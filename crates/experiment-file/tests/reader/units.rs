@@ -2,13 +2,14 @@
 
 use super::{BASE, edited, read};
 
-/// The warnings of a text that must be right, as people see them.
+/// The warnings of a valid text, as people see them.
 fn warnings(text: &str) -> Vec<String> {
     let (_, warnings) = read(text).unwrap_or_else(|error| panic!("{error}\nin\n{text}"));
     warnings.iter().map(ToString::to_string).collect()
 }
 
-/// [`BASE`] with one passage replaced has one warning: of this place, asking for this unit.
+/// Asserts that [`BASE`] with one passage replaced has one warning, at this place, which names
+/// this unit.
 fn doubted(from: &str, to: &str, path: &str, likely: &str) {
     let warnings = warnings(&edited(from, to));
     let [warning] = &warnings[..] else { panic!("{to}: {warnings:#?}") };
@@ -21,12 +22,12 @@ const CM_FOR_M: &str = "m instead of cm";
 const CM_FOR_MM: &str = "mm instead of cm";
 const DEGREES: &str = "degrees instead of radians";
 
-/// Robots that start like this.
+/// Start positions by this initialiser.
 fn positions(name: &str, params: &str) -> String {
     format!(r#""positions": {{"name": "{name}", "params": {params}}}}}"#)
 }
 
-/// Robots that look like this.
+/// Headings by this initialiser.
 fn orientations(name: &str, params: &str) -> String {
     let positions = POSITIONS.strip_suffix('}').unwrap();
     format!(r#"{positions}, "orientations": {{"name": "{name}", "params": {params}}}}}"#)

@@ -1,12 +1,12 @@
 //! The part of JSON Schema (draft 2020-12) that the schema of experiment files uses.
 //!
-//! A whole validator with its forty dependencies took as long to compile as this crate.
-//! What this one does not know makes it panic: no keyword is passed over.
+//! A full validator with its forty dependencies takes as long to compile as this crate. This one
+//! panics at unknown keywords, so it ignores none.
 
 use regex_lite::Regex;
 use serde_json::{Map, Value};
 
-/// What a value has against a schema; empty if it fits.
+/// The conflicts of a value with a schema; empty if it fits.
 pub fn problems(root: &Value, value: &Value) -> Vec<String> {
     Validator { root }.problems(root, value, "")
 }

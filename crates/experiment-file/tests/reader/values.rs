@@ -1,4 +1,4 @@
-//! What a right file means: defaults, alternatives, the canonical form.
+//! The meaning of valid files: defaults, alternatives, the canonical form.
 
 use super::validator::is_valid;
 use super::{BASE, accept, defaults, edited, read, refuse};
@@ -187,7 +187,7 @@ fn light_controllers_have_three_forms() {
     assert_eq!(params(r#"{"every": 9, "step": 0.1}"#), random(9, None, Some(0.1)));
 }
 
-/// Keys that were fixed constants: what is given, and that the default is left out.
+/// Keys of former constants: given values are kept, and defaults are omitted.
 #[test]
 fn constants_of_tasks_and_lights_are_keys_with_the_thesis_s_defaults() {
     let goto_light = r#""fitness_function": "goto_light""#;
@@ -263,7 +263,7 @@ fn sensors_of_the_original_have_their_lengths() {
     }
 }
 
-/// A script that says whatever there is to say.
+/// A script with every function.
 pub(super) const TASK: &str =
     r#""task": {"script": {"name": "t.star", "text": "pass"}}, "world": {"#;
 

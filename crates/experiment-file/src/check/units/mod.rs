@@ -1,5 +1,5 @@
-//! Values that are allowed, and look as if they were meant in another unit: warnings, each with
-//! the unit that is likely. A file whose author means what it says is accepted as it is.
+//! Warns of allowed values that look as if they were in another unit, and names the likely unit.
+//! The file is accepted unchanged.
 
 mod space;
 mod time;
@@ -13,14 +13,14 @@ pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
     time::check(&doubts);
 }
 
-/// Where doubts go, and what they are measured by.
+/// The receiver of warnings, and the scales for comparison.
 struct Doubts<'a> {
     config: &'a ExperimentConfig,
     report: &'a Report<'a>,
 }
 
 impl Doubts<'_> {
-    /// Warns of a value. `likely`: what its author may have had in mind.
+    /// Warns of a value. `likely`: the author's probable mistake.
     fn add(&self, path: &Path, what: String, likely: &str) {
         self.report.warning(path, || format!("{what}; {likely}?"));
     }
@@ -35,13 +35,13 @@ impl Doubts<'_> {
         self.config.world.width.min(self.config.world.height)
     }
 
-    /// The way of the fastest robot in a step, cm; 0 if none has wheels.
+    /// Distance that the fastest robot drives in a step, cm; 0 if none has wheels.
     fn longest_step(&self) -> f64 {
         self.config.robots().map(|(_, robot)| step(robot)).fold(0.0, f64::max)
     }
 }
 
-/// The longest way of a robot in a step, cm; 0 without wheels.
+/// Largest distance that a robot drives in a step, cm; 0 without wheels.
 fn step(robot: &RobotConfig) -> f64 {
     let wheels = robot.actuators.wheel_actuator.as_ref();
     wheels.map_or(0.0, |wheels| wheels.max_speed * wheels.step_duration)

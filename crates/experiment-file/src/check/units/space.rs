@@ -68,7 +68,7 @@ pub(super) fn check(doubts: &Doubts<'_>) {
     }
 }
 
-/// A distance in the world. `step`: what a robot covers in a step.
+/// Checks a distance in the world. `step`: distance that a robot drives in a step.
 fn reach(range: f64, step: f64, path: &Path, doubts: &Doubts<'_>) {
     let (width, height) = (doubts.config.world.width, doubts.config.world.height);
     if range > doubts.longer_side() {
@@ -125,7 +125,7 @@ fn robot(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
     }
 }
 
-/// Places where something starts are in the world.
+/// Start positions are within the world.
 fn at(positions: &Initializer, path: &Path, doubts: &Doubts<'_>) {
     let world = &doubts.config.world;
     let is_in =
@@ -190,7 +190,7 @@ fn crowd(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
             ((high - low) * (high - low), path.key("high"))
         }
         Initializer::RandomCircumference { radius, .. } => (radius * radius, path.key("radius")),
-        // It keeps robots apart by itself.
+        // The random graph keeps robots apart.
         Initializer::RandomGraph { .. } => return,
     };
     if area < f64::from(n) * APART * APART {

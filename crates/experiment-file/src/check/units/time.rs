@@ -13,7 +13,7 @@ const STEP_MIN: f64 = 0.001;
 const DT_MAX: f64 = 1.0;
 /// Shortest step of a network of spiking neurons, ms.
 const DT_MIN: f64 = 0.01;
-/// Voltages of neurons are tens of mV; what is nearer to 0 than this may be in V.
+/// Voltages of neurons are tens of mV; a value nearer to 0 than this may be in V.
 const VOLTAGE_MIN: f64 = 1.0;
 
 pub(super) fn check(doubts: &Doubts<'_>) {
@@ -57,7 +57,7 @@ fn wheels(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
     }
 }
 
-/// What is to happen in a trial happens before its end.
+/// Perturbations begin before the end of a trial.
 fn perturbations(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
     let perturbations = &robot.perturbations;
     let path = path.key("perturbations");
@@ -114,7 +114,7 @@ fn evolves(parameter: &NeuronParameter, ensemble: &str, doubts: &Doubts<'_>) -> 
     })
 }
 
-/// What the bounds of genes mean.
+/// Checks the decoded bounds of genes.
 fn genes(doubts: &Doubts<'_>) {
     let spec = doubts.config.topology.neuron_model.spec();
     for (name, population) in &doubts.config.algorithm.populations {

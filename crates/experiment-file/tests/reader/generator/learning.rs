@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::{Dice, insert, object};
 
-/// `learning`, and the names of the plastic ones of some groups.
+/// `learning`, and the names of its plastic groups.
 pub(super) fn learning(dice: &mut Dice, groups: &[String]) -> (Value, Vec<String>) {
     let keys = [
         ("learning_rate", dice.number(0.0, 1.0)),

@@ -1,5 +1,5 @@
-//! Random experiment files: every key, variant and form of the format, in
-//! combinations that are right, and ways to damage them.
+//! Random experiment files: every key, variant and form of the format, in valid combinations, and
+//! ways to damage them.
 
 mod algorithm;
 mod encoding;
@@ -14,7 +14,7 @@ use world::Robot;
 
 use determinism::random::{Purpose, Stream};
 
-/// Chance, for one file.
+/// The random choices for one file.
 pub(super) struct Dice(Stream);
 
 impl Dice {
@@ -26,7 +26,7 @@ impl Dice {
         self.0.below(n)
     }
 
-    /// One of 1..=n.
+    /// A random number in 1..=n.
     fn die(&mut self, n: usize) -> usize {
         1 + self.below(n)
     }
@@ -45,7 +45,7 @@ impl Dice {
         json!((number * 1000.0).round() / 1000.0)
     }
 
-    /// Each of the choices, or not.
+    /// A random subset of the choices.
     fn some<T: Clone>(&mut self, choices: &[T]) -> Vec<T> {
         choices.iter().filter(|_| self.chance(0.5)).cloned().collect()
     }
@@ -61,13 +61,13 @@ fn insert(object: &mut Value, key: &str, value: Value) {
     object[key] = value;
 }
 
-/// An experiment file that is right.
+/// A valid experiment file.
 pub(super) fn experiment(dice: &mut Dice) -> Value {
     let share_of_spiking = 0.4;
     experiment_with(dice, share_of_spiking)
 }
 
-/// An experiment file that is right, with spiking neurons.
+/// A valid experiment file with spiking neurons.
 pub(super) fn spiking_experiment(dice: &mut Dice) -> Value {
     experiment_with(dice, 1.0)
 }
@@ -91,7 +91,7 @@ fn experiment_with(dice: &mut Dice, share_of_spiking: f64) -> Value {
     file
 }
 
-/// Makes a file a little wrong, or differently right.
+/// Damages a file a little, or changes it to another valid one.
 pub(super) fn damage(dice: &mut Dice, value: &mut Value) {
     match value {
         Value::Object(map) if !map.is_empty() && dice.chance(0.95) => {

@@ -7,12 +7,12 @@ use super::learning::learning;
 use super::world::Robot;
 use super::{Dice, encoding, insert, object};
 
-/// A generated topology, and what queries have to know of it.
+/// A generated topology, with the names that queries need.
 pub(super) struct Network {
     pub(super) topology: Value,
     model: NeuronModel,
     is_dynamic: bool,
-    /// Stimuli with an encoder, and those of them whose receptive field has weights.
+    /// Stimuli with an encoder; and those whose receptive field has weights.
     encoded: Vec<String>,
     linear: Vec<String>,
     /// Groups of synapses that are plastic.

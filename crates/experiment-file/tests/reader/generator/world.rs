@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::{Dice, insert, object};
 
-/// What the generated robots carry, which everything else depends on.
+/// The devices of the generated robots, on which everything else depends.
 pub(super) struct Robot {
     n: usize,
     pub(super) msg_length: usize,
