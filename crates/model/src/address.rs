@@ -4,21 +4,21 @@ use std::{fmt, str::FromStr};
 
 use crate::ids::ExperimentId;
 
-/// Whom of an experiment somebody means.
+/// The address of genotypes of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Address {
     /// The experiment.
     pub experiment: ExperimentId,
-    /// Whom of it.
+    /// The genotypes within it.
     pub who: Who,
 }
 
-/// Whom somebody means.
+/// The genotypes that an address names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Who {
     /// `ID`: the champion.
     Champion,
-    /// `ID@G`: all individuals of a generation, or evolution after it.
+    /// `ID@G`: all individuals of a generation, or the state of evolution after it.
     Generation(u64),
     /// `ID@G/I`: an individual, by its index.
     Individual(u64, u32),
@@ -26,7 +26,7 @@ pub enum Who {
     Mean(u64),
 }
 
-/// What is no address.
+/// The error for a text that is not an address.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is not ID (the champion of experiment ID), ID@G (generation G), ID@G/I (its individual \
@@ -43,7 +43,7 @@ impl FromStr for Address {
 }
 
 fn parse(text: &str) -> Option<Address> {
-    // `u64` would take a sign.
+    // Parsing a `u64` would accept a sign.
     let number = |text: &str| -> Option<u64> {
         let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
         is_number.then(|| text.parse().ok()).flatten()

@@ -1,4 +1,5 @@
-//! What coordinator and workers name on the wire: jobs, trial sets and outputs.
+//! Converts jobs, trial sets and outputs between core types and messages of coordinator and
+//! workers.
 
 use experiment_file::limits;
 use sim_core::{Output, TrialSet};
@@ -6,7 +7,7 @@ use swarm_proto::v1::{self, job_id::Job, trial_set};
 
 use crate::ids::{EvaluationId, ExperimentId, JobId};
 
-/// A job's id as a message.
+/// Converts a job's id to a message.
 pub fn job(id: JobId) -> v1::JobId {
     let job = match id {
         JobId::Experiment(id) => Job::Experiment(id.0),
@@ -15,7 +16,7 @@ pub fn job(id: JobId) -> v1::JobId {
     v1::JobId { job: Some(job) }
 }
 
-/// Reads a job's id; none if it is of a kind that this version does not know.
+/// Reads a job's id; `None` if this version does not know its kind.
 pub fn read_job(job: Option<v1::JobId>) -> Option<JobId> {
     Some(match job?.job? {
         Job::Experiment(id) => ExperimentId(id).into(),
@@ -23,7 +24,7 @@ pub fn read_job(job: Option<v1::JobId>) -> Option<JobId> {
     })
 }
 
-/// A trial set as a message.
+/// Converts a trial set to a message.
 pub fn trial_set(set: TrialSet) -> v1::TrialSet {
     let set = match set {
         TrialSet::Generation(generation) => trial_set::TrialSet::Generation(generation),
@@ -37,7 +38,7 @@ pub fn trial_set(set: TrialSet) -> v1::TrialSet {
     v1::TrialSet { trial_set: Some(set) }
 }
 
-/// Reads a trial set, or says what is wrong with it: whoever sent it is not trusted to be right.
+/// Reads a trial set, or describes the mistake in it, because the sender is not trusted.
 pub fn read_trial_set(set: Option<v1::TrialSet>) -> Result<TrialSet, String> {
     let set = set.and_then(|set| set.trial_set).ok_or("the assignment names no trial set")?;
     let set = match set {
@@ -57,7 +58,7 @@ pub fn read_trial_set(set: Option<v1::TrialSet>) -> Result<TrialSet, String> {
     }
 }
 
-/// What is returned for a trial, as a message.
+/// Converts the kind of result for a trial to a message.
 pub fn output(output: Output) -> v1::Output {
     match output {
         Output::Fitness => v1::Output::Fitness,
@@ -65,8 +66,7 @@ pub fn output(output: Output) -> v1::Output {
     }
 }
 
-/// Reads what is to be returned for a trial; none if it is of a kind that this version does not
-/// know.
+/// Reads the kind of result for a trial; `None` if this version does not know it.
 pub fn read_output(output: v1::Output) -> Option<Output> {
     match output {
         v1::Output::Fitness => Some(Output::Fitness),

@@ -1,16 +1,16 @@
-//! Steps at which a test can have the coordinator die, to see that nothing is
-//! lost there. Builds without debug assertions have none of this.
+//! Steps at which a test can kill the coordinator, to check that nothing is lost. Builds without
+//! debug assertions omit them.
 
-/// The variable that arms a step: `kill STEP N` or `panic STEP N` lets the N-th
-/// passage be the last.
+/// The variable that arms a step: `kill STEP N` or `panic STEP N` ends the process at the N-th
+/// passage.
 #[cfg(debug_assertions)]
 const VARIABLE: &str = "SWARM_FAILPOINT";
 
-/// Marks a step; most of the time, nothing happens.
+/// Marks a step; does nothing unless the variable arms it.
 #[cfg(not(debug_assertions))]
 pub fn reached(_step: &str) {}
 
-/// Marks a step; most of the time, nothing happens.
+/// Marks a step; does nothing unless the variable arms it.
 #[cfg(debug_assertions)]
 pub fn reached(step: &str) {
     use std::sync::{

@@ -2,18 +2,18 @@
 
 use crate::limits::{KEY_LEN_MAX, TEXT_LEN_MAX};
 
-/// Where an experiment belongs.
+/// The membership of an experiment in a group.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Membership {
     /// The group's name; see [`check_name`].
     pub group: String,
-    /// What is particular about this run among those of the group, its seed aside, such as
-    /// `algorithm.population_size=50`; empty if nothing is. At most [`TEXT_LEN_MAX`] bytes.
+    /// The values, apart from the seed, in which this run differs from others of the group, such
+    /// as `algorithm.population_size=50`; empty if none. At most [`TEXT_LEN_MAX`] bytes.
     pub variant: String,
 }
 
 impl Membership {
-    /// A place in a group, or what is wrong with it.
+    /// A membership; or the mistake in its names.
     pub fn new(group: &str, variant: &str) -> Result<Self, String> {
         check_name(group)?;
         if variant.len() > TEXT_LEN_MAX || variant.chars().any(char::is_control) {
@@ -25,8 +25,9 @@ impl Membership {
     }
 }
 
-/// Whether a group can have this name: letters, digits, `-` and `_`, so that it is no path
-/// and no address, and not digits alone, so that it is no experiment's number.
+/// Checks the name of a group. It has letters, digits, `-` and `_`, so that it differs from paths
+/// and addresses, and at least one character that is not a digit, so that it differs from numbers
+/// of experiments.
 pub fn check_name(name: &str) -> Result<(), String> {
     let is_plain = |c: char| c.is_alphanumeric() || "-_".contains(c);
     if name.len() > KEY_LEN_MAX || !name.chars().all(is_plain) {

@@ -1,19 +1,19 @@
-//! Ids, each its own type, so that none is taken for another.
+//! Ids, each a type of its own, so that code cannot confuse them.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// An experiment; numbered from 1 by the store, never reused.
+/// Id of an experiment; the store numbers them from 1 and never reuses one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ExperimentId(pub u64);
 
-/// An evaluation, which nothing is stored of; numbered from 1 by the driver since
-/// the coordinator's start.
+/// Id of an evaluation, whose results are not stored; the driver numbers them from 1 since the
+/// coordinator's start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EvaluationId(pub u64);
 
-/// What the engine schedules. Experiments come before evaluations in its order.
+/// Id of a job, the unit that the engine schedules. Experiments sort before evaluations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum JobId {
     /// An experiment of the store.
@@ -44,16 +44,15 @@ impl From<EvaluationId> for JobId {
     }
 }
 
-/// A worker's connection; a worker that reconnects gets another.
+/// Id of a worker's connection; a worker that reconnects gets another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WorkerId(pub u64);
 
-/// An item given to a worker; an item that is given to another worker, or again,
-/// gets another.
+/// Id of an assignment; an item that is assigned again gets another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AssignmentId(pub u64);
 
-/// Something that the referee is asked.
+/// Id of a question for the referee.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct QuestionId(pub u64);
 

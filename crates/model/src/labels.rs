@@ -1,19 +1,18 @@
-//! Labels: what people find experiments by.
+//! Labels, by which people find experiments.
 
 use std::collections::BTreeMap;
 
-/// Labels of one experiment.
+/// Most labels of one experiment.
 pub const LABELS_MAX: usize = 32;
-/// Bytes of a label's key.
+/// Most bytes of a label's key.
 const KEY_LEN_MAX: usize = 63;
-/// Bytes of a label's value.
+/// Most bytes of a label's value.
 const VALUE_LEN_MAX: usize = 256;
 
 /// The labels of an experiment, by their keys.
 pub type Labels = BTreeMap<String, String>;
 
-/// Whether labels are such as an experiment can have, or what is wrong with the first that
-/// is not.
+/// Checks the labels of an experiment; the error describes the first invalid one.
 pub fn check(labels: &Labels) -> Result<(), String> {
     labels.iter().try_for_each(|(key, value)| check_label(key, value))?;
     match labels.len() {

@@ -1,15 +1,16 @@
-//! The database of experiments: what names them, the rows of the database, and the queries that
-//! read it. Whoever only reads or names experiments needs this crate and no coordinator.
+//! The database of experiments: ids and names, the rows of the database, and the queries that
+//! read it. Programs that only read or name experiments need this crate and no coordinator.
 //!
-//! - [`ids`], [`Address`], [`group`], [`labels`], [`priority`]: what names, joins and ranks
+//! - [`ids`], [`Address`], [`group`], [`labels`], [`priority`]: names, groups and weights of
 //!   experiments and genotypes
 //! - [`store`]: SQLite, one transaction per generation; [`shared_store`]: the same for
 //!   asynchronous code
-//! - [`submission`]: from an experiment file to a row; [`restored`]: from a row to evolution
-//! - [`queries`]: what can be read of experiments, in the messages of clients
-//! - [`codec`]: what coordinator and workers name on the wire
+//! - [`submission`]: converts an experiment file to a row; [`restored`]: converts a row to
+//!   evolution
+//! - [`queries`]: the calls that only read, in the messages of clients
+//! - [`codec`]: jobs, trial sets and outputs in messages of coordinator and workers
 //! - [`wire`]: rows as messages
-//! - [`limits`]: bounds on what is kept and answered
+//! - [`limits`]: bounds on stored data and on answers
 
 mod address;
 pub mod codec;

@@ -1,22 +1,23 @@
-//! Bounds on what is kept of experiments and on one answer about them, and those that clients know, too.
+//! Bounds on the stored data of experiments and on one answer about them, including those that
+//! clients check, too.
 
-/// Generations that are computed again at the same time for pages, which share the processor
-/// with the coordinator.
+/// Number of generations that are recomputed at the same time for pages, which share the
+/// processor with the coordinator.
 pub const RECONSTRUCTIONS_OF_PAGES_MAX: usize = 1;
 /// Bytes of genes and fitness in one answer with individuals of a generation.
 pub const INDIVIDUALS_LEN_MAX: usize = 8 << 20;
-/// Generations in one answer that says how evolution moved.
+/// Generations in one answer about the dynamics of evolution.
 pub const DYNAMICS_PAGE_LEN_MAX: u64 = 100;
-/// Generations that are gone through for one answer with parents and children.
+/// Generations that are repeated for one answer with parents and children.
 pub const FAMILIES_PAGE_LEN_MAX: u64 = 100;
-/// Children in one answer, after which no further generation is taken.
+/// Number of children in one answer after which no further generation is added.
 pub const CHILDREN_MAX: usize = 50_000;
-/// Genes of the individuals of all generations that one lineage goes through; a byte each.
+/// Genes of all individuals in the generations of one lineage; a byte each.
 pub const LINEAGE_GENES_MAX: u64 = 256 << 20;
 /// Ancestors in one answer.
 pub const ANCESTORS_MAX: usize = 100_000;
-/// Bytes of what a worker says about itself or its failures, where the rest is cut,
-/// and of a client's reason for a pause.
+/// Bytes of a worker's texts about itself and its failures, which are cut there, and of a
+/// client's reason for a pause.
 pub const TEXT_LEN_MAX: usize = 512;
 /// Bytes of `request_id` and `default_name`.
 pub const KEY_LEN_MAX: usize = 128;

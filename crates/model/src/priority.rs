@@ -1,8 +1,8 @@
-//! How much of the fleet an experiment gets when others want it too.
+//! The priority of an experiment, which determines its share of the fleet.
 
-/// Weight in the sharing of the fleet: an experiment of priority 200 gets twice
-/// the workers' time of one of priority 100, while both have work to hand out.
-/// No weight is so small that its experiment gets nothing.
+/// Weight in the sharing of the fleet: an experiment of priority 200 gets twice the workers' time
+/// of one of priority 100, while both have queued items. Every experiment gets some time, even
+/// with the smallest weight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Priority(u32);
 
@@ -10,7 +10,7 @@ impl Priority {
     /// Largest weight; the smallest is 1.
     pub const MAX: u32 = 1000;
 
-    /// A priority; none beyond 1..=[`MAX`](Self::MAX).
+    /// A priority; `None` outside 1..=[`MAX`](Self::MAX).
     pub fn new(weight: u32) -> Option<Self> {
         (1..=Self::MAX).contains(&weight).then_some(Self(weight))
     }

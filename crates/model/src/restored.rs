@@ -1,11 +1,12 @@
-//! Evolution of a stored experiment.
+//! Restores the evolution of a stored experiment.
 
 use evolution::{ALGORITHMS, Checkpoint, Digest, Evolution};
 use experiment_file::ExperimentConfig;
 
 use crate::store::StoredExperiment;
 
-/// Configuration and evolution of an experiment as the store has it, or what contradicts what.
+/// Configuration and evolution of a stored experiment, or the contradiction between stored
+/// values.
 pub fn restore(
     experiment: &StoredExperiment,
     checkpoint: &Checkpoint,

@@ -1,5 +1,5 @@
-//! The store as asynchronous code uses it: off the I/O threads, one at a time,
-//! and with a signal when something has been written.
+//! The store for asynchronous code: operations run off the I/O threads, one at a time, and a
+//! signal reports writes.
 
 use std::{
     sync::{Arc, Mutex, PoisonError},
@@ -17,29 +17,30 @@ const RETRY_DELAY_MIN: Duration = Duration::from_millis(250);
 /// Longest pause between attempts.
 const RETRY_DELAY_MAX: Duration = Duration::from_secs(5);
 
-/// Which failures of a write are worth another attempt.
+/// The failures of a write after which to try again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Retry {
-    /// Those that pass once the disk takes writes again.
+    /// Failures that pass once the disk accepts writes again.
     WhileUnavailable,
-    /// All: there is no other way to go on. Whoever repairs the database lets it
-    /// through.
+    /// All failures, because the program cannot continue without this write. Repairing the
+    /// database lets it through.
     Always,
 }
 
-/// What became of a write.
+/// The outcome of a write.
 #[derive(Debug)]
 #[must_use]
 pub enum Written {
     /// It is on disk.
     Yes,
-    /// The experiment has ended, or the coordinator stops: nothing is lost.
+    /// Nothing was written, because the experiment has ended or the coordinator stops; nothing is
+    /// lost.
     NotWanted,
     /// It cannot be written, now or later.
     Never(StoreError),
 }
 
-/// Why a coordinator must not write to its database any more; the texts are for people.
+/// Why a coordinator must no longer write to its database; the texts are for people.
 #[derive(Debug, Clone)]
 pub enum Unusable {
     /// Another coordinator has taken it over.
@@ -54,9 +55,9 @@ pub struct SharedStore {
     store: Arc<Mutex<Store>>,
     /// Counts writes.
     news: Arc<watch::Sender<u64>>,
-    /// Why the latest write did not reach the disk, if it did not.
+    /// Why the latest write failed, if it did.
     trouble: Arc<Mutex<Option<String>>>,
-    /// Set once, when nothing must be written any more.
+    /// Set once, when writes must stop.
     unusable: Arc<watch::Sender<Option<Unusable>>>,
 }
 
@@ -71,7 +72,8 @@ impl SharedStore {
         }
     }
 
-    /// Takes it from now on that another program may have written whenever so much time is over.
+    /// Reports news at this interval from now on, because another program may write to the
+    /// database.
     pub fn look_every(&self, interval: Duration) {
         let news = Arc::downgrade(&self.news);
         tokio::spawn(async move {
@@ -84,24 +86,24 @@ impl SharedStore {
         });
     }
 
-    /// Waits until nothing must be written any more; says why.
+    /// Waits until writes must stop; returns why.
     pub async fn unusable(&self) -> Unusable {
         let mut reason = self.unusable.subscribe();
         let reason = reason.wait_for(Option::is_some).await;
         reason.ok().and_then(|reason| reason.clone()).expect("this store has the sender")
     }
 
-    /// Changes whenever something has been written.
+    /// Changes after each write.
     pub fn news(&self) -> watch::Receiver<u64> {
         self.news.subscribe()
     }
 
-    /// Why the latest write did not reach the disk, if it did not.
+    /// Why the latest write failed, if it did.
     pub fn trouble(&self) -> Option<String> {
         self.trouble.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Reads.
+    /// Runs a read operation.
     pub async fn read<T: Send + 'static>(
         &self,
         query: impl FnOnce(&Store) -> T + Send + 'static,
@@ -134,15 +136,15 @@ impl SharedStore {
     ) -> T {
         let store = Arc::clone(&self.store);
         task::spawn_blocking(move || {
-            // A panic inside rolls its transaction back: the store is still good.
+            // A panic inside rolls its transaction back, so the store stays usable.
             operation(&mut store.lock().unwrap_or_else(PoisonError::into_inner))
         })
         .await
         .expect("store operations do not panic")
     }
 
-    /// Writes something that must not be lost, `what` in the log: tries again, as
-    /// `retry` says, for as long as it takes.
+    /// Writes data that must not be lost; tries again without limit, as `retry` says. `what`: its
+    /// name in the log.
     pub async fn write(
         &self,
         shutdown: &CancellationToken,

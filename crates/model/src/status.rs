@@ -1,4 +1,4 @@
-//! Why something cannot be read, as gRPC statuses.
+//! Converts errors of queries to gRPC statuses.
 
 use tonic::Status;
 
@@ -8,7 +8,7 @@ impl From<StoreError> for Status {
     fn from(error: StoreError) -> Self {
         let text = error.to_string();
         match error {
-            // Not UNAVAILABLE, which is what clients make up when there is no coordinator.
+            // Not UNAVAILABLE, which client libraries return when there is no coordinator.
             StoreError::Unavailable(_) => Self::resource_exhausted(text),
             StoreError::Ended(_)
             | StoreError::Unfinished(_)

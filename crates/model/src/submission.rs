@@ -1,4 +1,4 @@
-//! From an experiment file to an experiment that can be stored and run.
+//! Turns an experiment file into an experiment that can be stored and run.
 
 mod difference;
 
@@ -13,7 +13,7 @@ use crate::{
 };
 use evolution::{ALGORITHMS, Digest, Evolution, Fork};
 
-/// What a client submits.
+/// A client's submission.
 #[derive(Debug, Clone, Default)]
 pub struct Submission {
     /// Key against double submission.
@@ -26,22 +26,22 @@ pub struct Submission {
     pub seed: Option<u64>,
     /// Replaces the file's number of generations.
     pub generations: Option<u64>,
-    /// Its share of the fleet.
+    /// Its priority.
     pub priority: Priority,
-    /// The group that it belongs to, if any.
+    /// Its group, if any.
     pub membership: Option<Membership>,
-    /// What people find it by.
+    /// Its labels, by which people find it.
     pub labels: Labels,
-    /// What it goes on from, if it is a fork.
+    /// Its parent, if it is a fork.
     pub parent: Option<Parent>,
 }
 
-/// What a fork goes on from.
+/// The parent of a fork.
 #[derive(Debug, Clone)]
 pub struct Parent {
-    /// The other experiment.
+    /// The parent experiment.
     pub experiment: StoredExperiment,
-    /// Its evolution after the last generation that is shared.
+    /// Its evolution after the last shared generation.
     pub evolution: Evolution,
 }
 
@@ -56,15 +56,15 @@ pub struct CheckedSubmission {
 }
 
 impl Submission {
-    /// Checks everything about a submission; it can run if this succeeds. When `goes_on` says
-    /// no, it ends trying how the experiment begins, and warns of that.
+    /// Checks a submission completely; it can run if this succeeds. If `goes_on` returns false,
+    /// the check stops trying start positions, and warns of that.
     pub fn check(self, goes_on: &dyn Fn() -> bool) -> Result<CheckedSubmission, ConfigError> {
         let (mut config, warnings) =
             ExperimentConfig::from_json(&self.config_json, &self.default_name, ALGORITHMS)?;
         if self.seed.is_some() || self.generations.is_some() {
             config.seed = self.seed.unwrap_or(config.seed);
             config.algorithm.generations = self.generations.unwrap_or(config.algorithm.generations);
-            // The file's limits hold for what replaces parts of it, too.
+            // The limits of a file also apply to values that replace parts of it.
             let name = config.name.clone();
             (config, _) =
                 ExperimentConfig::from_json(&config.to_canonical_json(), &name, ALGORITHMS)?;
@@ -101,7 +101,7 @@ impl Submission {
 }
 
 impl Parent {
-    /// Goes on as an experiment of another configuration.
+    /// Forks the parent's evolution with another configuration.
     fn fork(
         self,
         config: &ExperimentConfig,

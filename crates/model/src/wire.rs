@@ -1,4 +1,4 @@
-//! Rows as messages for clients.
+//! Converts rows to messages for clients.
 
 use evolution::{Champion, ChampionSource, HeldOut, Judged};
 use swarm_proto::v1::{self, event::Kind};
@@ -98,7 +98,7 @@ impl From<ExperimentState> for v1::ExperimentState {
     }
 }
 
-/// INVALID_ARGUMENT for a state that there is not.
+/// Fails with INVALID_ARGUMENT for an unknown state.
 impl TryFrom<v1::ExperimentState> for ExperimentState {
     type Error = Status;
 
@@ -126,7 +126,7 @@ pub fn has_ended(state: v1::ExperimentState) -> bool {
     ExperimentState::try_from(state).is_ok_and(|state| !state.is_unfinished())
 }
 
-/// A genotype; `network_json`: empty if it is not decoded.
+/// A genotype as a message; `network_json`: empty if it is not decoded.
 pub fn individual(
     experiment_id: u64,
     individual: Champion,

@@ -1,4 +1,4 @@
-//! An ended experiment as a bundle.
+//! Packs an ended experiment as a bundle.
 
 use bundle::{Bundle, FORMAT, ForkOf, GenerationRow, Manifest, champion_json};
 use evolution::{Digest, End, Told};
@@ -11,7 +11,7 @@ use crate::{
 
 use super::{QueryError, experiment, generation::Gap};
 
-/// An ended experiment, and everything that its results follow from.
+/// The bundle of an ended experiment, with everything from which its results follow.
 pub fn bundle(store: &Store, id: ExperimentId) -> Result<Bundle, QueryError> {
     let StoredExperiment { record: experiment, config_json } = experiment(store, id)?;
     if experiment.state.is_unfinished() {
@@ -33,7 +33,7 @@ pub fn bundle(store: &Store, id: ExperimentId) -> Result<Bundle, QueryError> {
     let n_own = log.len();
     let log = (1..).zip(log).map(|(place, entry)| {
         let told = Told::from_bytes(&entry).map_err(|error| undecodable(error.to_string()))?;
-        // A run that was given more generations later did not end where it first did.
+        // An extended run did not end at its first end.
         let end = if place == n_own { told.end } else { End::default() };
         Ok(Told { end, ..told }.to_bytes())
     });

@@ -1,5 +1,5 @@
-//! The calls that only read, and those of them that read rows: experiments, and what has happened
-//! to them, page by page.
+//! The list of calls that only read, and the calls that read rows: experiments, generations and
+//! events, page by page.
 
 use swarm_proto::v1::{
     CompletedGeneration, GetExperimentRequest, GetExperimentResponse, ListEventsRequest,
@@ -16,8 +16,8 @@ use crate::{
 
 use super::{Reader, experiment};
 
-/// Passes all reading calls of `ExperimentService` to a macro, before what else it gets. Each is a
-/// method of [`Reader`], from request to response.
+/// Passes all reading calls of `ExperimentService` to a macro, before its other arguments. Each
+/// is a method of [`Reader`], from request to response.
 #[macro_export]
 macro_rules! reading_calls {
     ($then:ident $($rest:tt)*) => {
@@ -47,7 +47,7 @@ impl Reader {
         Ok(self.read(move |store| experiment(store, id)).await?.into())
     }
 
-    /// The experiments that a client wants, oldest first.
+    /// The experiments that pass a client's filters, oldest first.
     pub async fn list_experiments(
         &self,
         request: ListExperimentsRequest,
@@ -97,7 +97,7 @@ impl Reader {
     }
 }
 
-/// Which experiments a client wants; INVALID_ARGUMENT for a state that there is not.
+/// The filters of a client; INVALID_ARGUMENT for an unknown state.
 fn filter(request: ListExperimentsRequest) -> Result<Filter, Status> {
     let states = request.states().map(TryInto::try_into).collect::<Result<_, _>>()?;
     let ListExperimentsRequest {
@@ -125,12 +125,12 @@ fn filter(request: ListExperimentsRequest) -> Result<Filter, Status> {
     })
 }
 
-/// Items of a page; 0 asks for as many as possible.
+/// Length of a page; 0 requests the largest.
 fn page_len(page_size: u32) -> u32 {
     if page_size == 0 { PAGE_LEN_MAX } else { page_size.min(PAGE_LEN_MAX) }
 }
 
-/// A page, and the first item after it, if there is one.
+/// Splits items into a page and the first item after it, if there is one.
 fn split<T>(mut items: Vec<T>, page_len: u32) -> (Vec<T>, Option<T>) {
     let rest = items.split_off((page_len as usize).min(items.len()));
     (items, rest.into_iter().next())

@@ -1,4 +1,4 @@
-//! How evolution moved, generation by generation, found by going through them again.
+//! Measures how evolution moved, generation by generation, by repeating the generations.
 
 use evolution::{Checkpoint, Evolution, Told};
 use swarm_proto::v1::{GenerationDynamics, ListDynamicsRequest, ListDynamicsResponse};
@@ -13,7 +13,7 @@ use crate::{
 use super::{QueryError, Reader, experiment, generation::Gap};
 
 impl Reader {
-    /// How a page of generations moved the distribution.
+    /// The dynamics of a page of generations.
     pub async fn list_dynamics(
         &self,
         request: ListDynamicsRequest,
@@ -26,19 +26,19 @@ impl Reader {
     }
 }
 
-/// What the dynamics of some generations are computed from.
+/// The stored data from which the dynamics of some generations are computed.
 #[derive(Debug)]
 struct StoredDynamics {
     experiment: ExperimentRecord,
     first: u64,
-    /// Before the first one.
+    /// The checkpoint before the first of these generations.
     checkpoint: Option<Checkpoint>,
     log: Vec<LogEntry>,
 }
 
 impl StoredDynamics {
-    /// Reads what is needed of at most a page of generations from `from` on; of a fork, from
-    /// its own first one on.
+    /// Reads the data of at most a page of generations from `from` on; for a fork, from its own
+    /// first one on.
     fn read(store: &Store, id: ExperimentId, from: u64) -> Result<Self, QueryError> {
         let experiment = experiment(store, id)?.record;
         let n_generations = experiment.n_generations();
@@ -58,7 +58,7 @@ impl StoredDynamics {
         Ok(Self { experiment, first, checkpoint: Some(checkpoint), log })
     }
 
-    /// Goes through the generations again: work for a CPU.
+    /// Repeats the generations; CPU-bound.
     fn replay(self) -> Result<ListDynamicsResponse, QueryError> {
         let Self { experiment, first, checkpoint, log } = self;
         let Some(checkpoint) = checkpoint else { return Ok(ListDynamicsResponse::default()) };

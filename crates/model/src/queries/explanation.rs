@@ -1,12 +1,12 @@
-//! What the store knows of why nothing happens.
+//! The store's part of an explanation.
 
 use crate::store::{Event, EventKind, ExperimentRecord, Store};
 
 use super::QueryError;
 
-/// Events among which notices are looked for.
+/// Number of latest events to search for notices.
 const EVENTS_MAX: u32 = 100;
-/// Notices that are shown.
+/// Most notices to show.
 const NOTICES_MAX: usize = 10;
 
 /// The latest notices among an experiment's events, oldest first.

@@ -1,4 +1,4 @@
-//! Parents and their children, found by going through generations again.
+//! Finds parents and their children by repeating generations.
 
 use std::num::NonZeroU64;
 
@@ -21,13 +21,13 @@ pub struct Families {
     pub populations: Vec<String>,
     /// The generations by their numbers.
     pub generations: Vec<(u64, evolution::Families)>,
-    /// The generation from which on to ask next.
+    /// The first generation of the next page.
     pub next: u64,
 }
 
 impl Reader {
-    /// Parents and children of a page of generations from `from` on, of those whose number `every`
-    /// divides. Refused where individuals have no parents.
+    /// Parents and children in a page of generations from `from` on whose number `every` divides.
+    /// Fails if individuals have no parents.
     pub async fn families(
         &self,
         id: u64,
@@ -39,21 +39,21 @@ impl Reader {
     }
 }
 
-/// The generations from which the families of some are computed.
+/// The stored generations from which families are computed.
 #[derive(Debug)]
 struct StoredFamilies {
     experiment: StoredExperiment,
     first: u64,
-    /// One generation in so many is wanted, those whose number it divides.
+    /// Select the generations whose number this divides.
     every: NonZeroU64,
-    /// Before the first one, and the log from the generation before that on; none if there is
-    /// nothing to go through.
+    /// The checkpoint before the first generation with parents, and the log from the generation
+    /// before it on; `None` if no generation is to be repeated.
     stored: Option<(Checkpoint, Vec<LogEntry>)>,
 }
 
 impl StoredFamilies {
-    /// Reads at most a page of generations from `from` on. The first one with parents is the one
-    /// after the first in the log; of a fork, after its own first one.
+    /// Reads at most a page of generations from `from` on. The first one with parents follows the
+    /// first one in the log, which for a fork is its own first one.
     fn read(
         store: &Store,
         id: ExperimentId,
@@ -80,7 +80,7 @@ impl StoredFamilies {
         Ok(Self { experiment, first, every, stored })
     }
 
-    /// Goes through the generations again: work for a CPU.
+    /// Repeats the generations; CPU-bound.
     fn replay(self) -> Result<Families, QueryError> {
         let Self { experiment, first, every, stored } = self;
         let other = |what: String| QueryError::OtherBits {

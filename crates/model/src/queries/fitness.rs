@@ -1,4 +1,4 @@
-//! How fit every individual was, generation by generation.
+//! The fitness of every individual, generation by generation.
 
 use evolution::Told;
 
@@ -6,9 +6,9 @@ use crate::{ids::ExperimentId, limits::PAGE_LEN_MAX, store::Store};
 
 use super::{QueryError, experiment};
 
-/// Mean fitness over the trials, `[generation][individual]`, of at most `n` generations from
-/// the first one on that the fitness log has, but not before `from`; and the number of that
-/// one.
+/// Mean fitness over the trials, shape `[generation][individual]`, of at most `n` generations;
+/// and the number of the first one, which is the first in the fitness log that is not before
+/// `from`.
 pub fn fitness(
     store: &Store,
     id: ExperimentId,

@@ -1,4 +1,4 @@
-//! A generation that is computed again from the fitness log.
+//! Recomputes a generation from the fitness log.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use crate::{
 
 use super::{QueryError, experiment};
 
-/// A generation as the store has it: what it is computed from.
+/// A stored generation: the data from which it is recomputed.
 #[derive(Debug)]
 pub struct StoredGeneration {
     /// Its experiment.
@@ -22,19 +22,19 @@ pub struct StoredGeneration {
     told: Vec<u8>,
 }
 
-/// A generation, and what came of it.
+/// A recomputed generation, and its result.
 #[derive(Debug)]
 pub struct Replayed {
     /// The genotypes.
     pub generation: Generation,
-    /// What evolution was told of them.
+    /// Their recorded fitness.
     pub told: Told,
-    /// Evolution after it.
+    /// The state of evolution after it.
     pub after: Evolution,
 }
 
 impl StoredGeneration {
-    /// Reads what a generation is computed from.
+    /// Reads the data from which a generation is recomputed.
     pub fn read(store: &Store, id: ExperimentId, generation: u64) -> Result<Self, QueryError> {
         let experiment = experiment(store, id)?;
         check_in_log(store, &experiment, generation)?;
@@ -44,7 +44,7 @@ impl StoredGeneration {
         Ok(Self { experiment, of, checkpoint, told })
     }
 
-    /// What evolution was told of it.
+    /// Its recorded fitness.
     pub fn told(&self) -> Result<Told, QueryError> {
         Told::from_bytes(&self.told).map_err(|error| self.other(error.to_string()))
     }
@@ -59,8 +59,8 @@ impl StoredGeneration {
         }
     }
 
-    /// Goes through the generation again: work for a CPU. Genotypes and fitness have the
-    /// digest of the history, or there is an error.
+    /// Repeats the generation; CPU-bound. Fails unless genotypes and fitness have the digest of
+    /// the history.
     pub fn replay(&self) -> Result<Replayed, QueryError> {
         let Self { of, checkpoint, .. } = self;
         let restored = Evolution::restore(checkpoint);
@@ -77,7 +77,7 @@ impl StoredGeneration {
     }
 }
 
-/// That the fitness log of an experiment has a generation.
+/// Checks that the fitness log of an experiment has a generation.
 pub(super) fn check_in_log(
     store: &Store,
     experiment: &ExperimentRecord,
@@ -97,12 +97,12 @@ pub(super) fn check_in_log(
 /// Why a generation is not in a fitness log; displays as a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Gap {
-    /// The first generation that is.
+    /// The first generation in the log.
     first: u64,
     gap: LogGap,
-    /// The parent of a fork, and the generation there.
+    /// The parent of a fork, and the generation of the parent.
     elsewhere: Option<(ExperimentId, u64)>,
-    /// Whether that is in the database.
+    /// Whether the parent is in the database.
     is_there: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Genotypes: champions, and whoever else has lived, computed again from the fitness log.
+//! Reads genotypes: champions, and all other individuals, recomputed from the fitness log.
 
 use evolution::{ALGORITHMS, Champion, ChampionSource, Genotype};
 use experiment_file::ExperimentConfig;
@@ -34,7 +34,7 @@ impl Reader {
         found.ok_or_else(|| Status::invalid_argument(format!("`{address}` is nobody")))
     }
 
-    /// Genotypes, computed again if need be.
+    /// Genotypes, recomputed if necessary.
     pub async fn get_individuals(
         &self,
         request: GetIndividualsRequest,
@@ -48,39 +48,39 @@ impl Reader {
     }
 }
 
-/// Genotypes as the store has them.
+/// The stored data of genotypes.
 #[derive(Debug)]
 enum StoredIndividuals {
     /// A champion.
     Champion(StoredExperiment, Champion),
-    /// Some of a generation.
+    /// Individuals of a generation.
     OfGeneration(StoredGeneration, Wanted),
 }
 
-/// Which individuals of a whole generation.
+/// A page of the individuals of a generation.
 #[derive(Debug, Clone, Copy)]
 struct Several {
-    /// The index of the first.
+    /// Index of the first individual.
     first: u32,
-    /// How many at most; 0: as many as possible.
+    /// Most individuals; 0: as many as possible.
     len: u32,
     /// Whether their genotypes stay empty.
     fitness_only: bool,
 }
 
-/// Whom of a generation.
+/// The requested genotypes of a generation.
 #[derive(Debug, Clone, Copy)]
 enum Wanted {
-    /// Some of all.
+    /// A page of all individuals.
     Page(Several),
-    /// The one of this index.
+    /// The individual of this index.
     Individual(u32),
-    /// The mean of the distribution after it.
+    /// The mean of the distribution after the generation.
     Mean,
 }
 
 impl StoredIndividuals {
-    /// Reads what there is to know of those at an address; of a whole generation, a page.
+    /// Reads the data of the genotypes at an address; for a whole generation, a page.
     fn read(store: &Store, address: Address, page: Several) -> Result<Self, QueryError> {
         let id = address.experiment;
         let (generation, wanted) = match address.who {
@@ -96,8 +96,8 @@ impl StoredIndividuals {
         Ok(Self::OfGeneration(StoredGeneration::read(store, id, generation)?, wanted))
     }
 
-    /// Computes the generation again, and decodes a single genotype unless another version of the
-    /// simulation computed the experiment: work for a CPU.
+    /// Recomputes the generation, and decodes a single genotype unless another version of the
+    /// simulation computed the experiment; CPU-bound.
     fn reconstruct(self) -> Result<GetIndividualsResponse, QueryError> {
         let (experiment, individuals, next_individual, is_single) = match self {
             Self::Champion(experiment, champion) => (experiment, vec![champion], None, true),
@@ -121,7 +121,7 @@ impl StoredIndividuals {
     }
 }
 
-/// Computes a generation again, and takes some of it.
+/// Recomputes a generation, and selects some of its genotypes.
 fn individuals(
     stored: &StoredGeneration,
     wanted: Wanted,

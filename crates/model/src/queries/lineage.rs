@@ -1,4 +1,4 @@
-//! Whom an individual descends from, found by going through its generations again.
+//! Finds the ancestors of an individual by repeating its generations.
 
 use evolution::{Ancestor, Checkpoint, Evolution, Operator, Pedigree, Told};
 use experiment_file::ExperimentConfig;
@@ -16,7 +16,7 @@ use crate::{
 use super::{QueryError, Reader, address, experiment, generation::check_in_log};
 
 impl Reader {
-    /// Whom an individual descends from.
+    /// The lineage of an individual.
     pub async fn get_lineage(
         &self,
         request: GetLineageRequest,
@@ -27,21 +27,20 @@ impl Reader {
     }
 }
 
-/// What a lineage is computed from.
+/// The stored data from which a lineage is computed.
 #[derive(Debug)]
 struct StoredLineage {
     experiment: StoredExperiment,
     individual: u32,
-    /// Of the earliest generation.
+    /// The checkpoint before the earliest generation.
     checkpoint: Checkpoint,
     first: u64,
-    /// From the earliest generation to that of the individual.
+    /// The log from the earliest generation to that of the individual.
     log: Vec<LogEntry>,
 }
 
 impl StoredLineage {
-    /// Reads what the lineage of an individual is computed from. `depth`: generations before
-    /// its own.
+    /// Reads the data of an individual's lineage. `depth`: number of generations before its own.
     fn read(store: &Store, address: Address, depth: u32) -> Result<Self, QueryError> {
         let id = address.experiment;
         let Who::Individual(generation, individual) = address.who else {
@@ -58,8 +57,8 @@ impl StoredLineage {
         Ok(Self { experiment, individual, checkpoint, first, log })
     }
 
-    /// Goes through the generations again: work for a CPU. Populations descend on their own; later
-    /// generations come first.
+    /// Repeats the generations; CPU-bound. Each population has its own lineage; later generations
+    /// come first.
     fn trace(self) -> Result<GetLineageResponse, QueryError> {
         let Self { experiment, individual, checkpoint, first, log } = self;
         let (id, generation) = (experiment.id, first + log.len() as u64 - 1);
@@ -140,7 +139,7 @@ fn ancestor(ancestor: Ancestor) -> v1::Ancestor {
     }
 }
 
-/// The algorithm draws individuals from a distribution.
+/// The error if the algorithm draws individuals from a distribution.
 pub fn no_parents(experiment: &StoredExperiment, config: &ExperimentConfig) -> QueryError {
     QueryError::NoLineage(format!(
         "experiment {} evolves a distribution, by {}: its individuals have no parents",

@@ -1,7 +1,6 @@
-//! Everything that is read: what there is to know of experiments, in the messages of clients.
+//! The calls that only read experiments, in the messages of clients.
 //!
-//! Queries work on the store alone, so they need no running driver and cannot slow
-//! one down.
+//! Queries use only the store, so they need no running driver and cannot slow one down.
 
 mod bundle;
 mod calls;
@@ -35,7 +34,7 @@ pub enum QueryError {
     /// There is no such experiment.
     #[error("there is no experiment {0}; `swarmctl list` shows all")]
     NotFound(ExperimentId),
-    /// A bundle is of an experiment that has ended.
+    /// Only an ended experiment has a bundle.
     #[error("experiment {0} has not ended: `swarmctl watch {0}` ends when it has")]
     NotEnded(ExperimentId),
     /// There is no champion yet.
@@ -54,7 +53,7 @@ pub enum QueryError {
         experiment: ExperimentId,
         /// The generation.
         generation: u64,
-        /// Complete generations.
+        /// Number of complete generations.
         n_generations: u64,
     },
     /// The fitness log lacks a generation.
@@ -67,7 +66,7 @@ pub enum QueryError {
         /// Why it is not there.
         why: Gap,
     },
-    /// The fitness log is not what was stored.
+    /// The fitness log differs from the stored one.
     #[error(
         "the fitness log of experiment {experiment} is damaged near generation {generation}; \
          `swarmctl doctor --data-dir DIR` says what of it is sound"
@@ -75,7 +74,7 @@ pub enum QueryError {
     DamagedLog {
         /// The experiment.
         experiment: ExperimentId,
-        /// The generation that was to come back.
+        /// The requested generation.
         generation: u64,
     },
     /// A generation has no such individual.
@@ -91,7 +90,7 @@ pub enum QueryError {
         generation: u64,
         /// The index.
         individual: u32,
-        /// Individuals of the generation.
+        /// Number of individuals of the generation.
         n_individuals: u32,
     },
     /// The algorithm has no distribution.
@@ -103,7 +102,7 @@ pub enum QueryError {
     /// An individual without a lineage, or one that is too large.
     #[error("{0}")]
     NoLineage(String),
-    /// What is computed again differs from what was stored.
+    /// A recomputed generation differs from the stored one.
     #[error(
         "generation {generation} of experiment {experiment} does not come back to the same bits: \
          {what}; use the release that computed it, \"{theirs}\""
@@ -113,12 +112,12 @@ pub enum QueryError {
         experiment: ExperimentId,
         /// The generation.
         generation: u64,
-        /// What differs.
+        /// The difference.
         what: String,
         /// Fingerprint of the simulation that computed it.
         theirs: String,
     },
-    /// What is stored cannot be decoded.
+    /// Stored data cannot be decoded.
     #[error("{0}")]
     Undecodable(String),
     /// The store cannot be read.
@@ -126,7 +125,7 @@ pub enum QueryError {
     Store(#[from] StoreError),
 }
 
-/// An address from a client; INVALID_ARGUMENT if it is none.
+/// Reads an address from a client; INVALID_ARGUMENT if it is invalid.
 fn address(text: &str) -> Result<Address, Status> {
     text.parse().map_err(|error: NotAnAddress| Status::invalid_argument(error.to_string()))
 }

@@ -1,4 +1,4 @@
-//! The calls of clients that only read, on a database.
+//! Answers the calls of clients that only read, from a database.
 
 use std::{io, path::Path, time::Duration};
 
@@ -20,33 +20,34 @@ use crate::{
 
 use super::{QueryError, fitness};
 
-/// How often a data directory is looked at that somebody else may write to.
+/// Interval between looks at a data directory that another program may write to.
 const LOOK_EVERY: Duration = Duration::from_secs(2);
 
 /// Answers the reading calls of `ExperimentService`.
 #[derive(Debug)]
 pub struct Reader {
     store: SharedStore,
-    /// One for each generation that is computed again.
+    /// One permit for each generation that is recomputed.
     reconstructions: Semaphore,
     news: watch::Receiver<u64>,
 }
 
 impl Reader {
-    /// On a store. `n_reconstructions`: generations that are computed again at the same time.
+    /// A reader of a store. `n_reconstructions`: number of generations that are recomputed at the
+    /// same time.
     pub fn new(store: SharedStore, n_reconstructions: usize) -> Self {
         let news = store.news();
         Self { store, reconstructions: Semaphore::new(n_reconstructions), news }
     }
 
-    /// On a connection of its own to the database in `directory`, which writes nothing; `news`
-    /// changes when something has been written.
+    /// A reader with its own read-only connection to the database in `directory`; `news` changes
+    /// after each write.
     pub fn open(directory: &Path, news: watch::Receiver<u64>) -> Result<Self, StoreError> {
         Ok(Self { news, ..Self::beside(directory)? })
     }
 
-    /// On the database in `directory`, to which another program may write; looks for news now and
-    /// then.
+    /// A reader of the database in `directory`, to which another program may write; it regularly
+    /// looks for news.
     pub fn open_alone(directory: &Path) -> Result<Self, StoreError> {
         let this = Self::beside(directory)?;
         this.store.look_every(LOOK_EVERY);
@@ -58,14 +59,14 @@ impl Reader {
         Ok(Self::new(store, RECONSTRUCTIONS_OF_PAGES_MAX))
     }
 
-    /// Changes when something may have been stored.
+    /// Changes when the database may have changed.
     pub fn news(&self) -> watch::Receiver<u64> {
         self.news.clone()
     }
 
-    /// Mean fitness over the trials, `[generation][individual]`, of at most `n` generations
-    /// from the first one on that the fitness log has, but not before `from`; and the number
-    /// of that one.
+    /// Mean fitness over the trials, shape `[generation][individual]`, of at most `n`
+    /// generations; and the number of the first one, which is the first in the fitness log that
+    /// is not before `from`.
     pub async fn fitness(
         &self,
         id: u64,
@@ -83,8 +84,8 @@ impl Reader {
         Ok(self.store.read(query).await?)
     }
 
-    /// Reads, and then computes something of it again: work for a CPU, of which there is little at
-    /// the same time.
+    /// Reads, and then recomputes from the data; CPU-bound, so few of these calls run at the same
+    /// time.
     pub(super) async fn reconstruct<S: Send + 'static, T: Send + 'static>(
         &self,
         query: impl FnOnce(&Store) -> Result<S, QueryError> + Send + 'static,
@@ -102,7 +103,7 @@ impl Reader {
 macro_rules! calls {
     (reads { $($name:ident($request:ident) -> $response:ident;)* }) => {
         impl Reader {
-            /// A call by its name: request and response as they travel.
+            /// Makes a call by its name; request and response are encoded messages.
             pub async fn call(&self, name: &str, request: &[u8]) -> Result<Vec<u8>, Status> {
                 $(
                     if stringify!($request).strip_suffix("Request") == Some(name) {
@@ -119,10 +120,10 @@ macro_rules! calls {
 
 crate::reading_calls!(calls);
 
-/// The same for code that is not asynchronous.
+/// A reader for synchronous code.
 #[derive(Debug)]
 pub struct BlockingReader {
-    /// Dropped before the runtime that its tasks are on.
+    /// Dropped before the runtime of its tasks.
     reader: Reader,
     runtime: Runtime,
 }
@@ -135,7 +136,7 @@ impl BlockingReader {
         Ok(Self { reader, runtime })
     }
 
-    /// A reading call by its name: request and response as they travel.
+    /// Makes a reading call by its name; request and response are encoded messages.
     pub fn call(&self, name: &str, request: &[u8]) -> Result<Vec<u8>, Status> {
         self.runtime.block_on(self.reader.call(name, request))
     }

@@ -1,4 +1,4 @@
-//! Writes on a disk that does not take them.
+//! Writes to a disk that refuses them.
 
 use std::{
     fs,
@@ -22,7 +22,7 @@ fn new_experiment() -> NewExperiment {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/quickstart.json");
     let config_json = fs::read_to_string(path).unwrap();
     let new = Submission { config_json, ..Submission::default() }.check(&|| true).unwrap().new;
-    // More than fits into what an empty database has reserved.
+    // More than fits into the reserved space of an empty database.
     NewExperiment { keyframe: vec![0; 1 << 16], ..new }
 }
 
@@ -34,8 +34,8 @@ async fn pragma(store: &SharedStore, name: &'static str, value: u32) {
     store.read(move |store| store.connection().pragma_update(None, name, value)).await.unwrap();
 }
 
-/// While the pragma has the bad value, a write waits; with the good one, it
-/// succeeds by itself.
+/// Asserts that a write waits while the pragma has the bad value, and succeeds by itself with the
+/// good one.
 async fn assert_waits_out(name: &'static str, bad: u32, good: u32, expected: &str) {
     let (_directory, store) = shared();
     pragma(&store, name, bad).await;

@@ -11,8 +11,8 @@ use super::{
     seals::{Seal, Sealer},
 };
 
-/// Replaces an experiment's champion. `latest`: the experiment's latest generation;
-/// `digest`: of everything so far.
+/// Replaces an experiment's champion. `latest`: the experiment's latest generation; `digest`: the
+/// link that covers everything so far.
 pub fn put(
     transaction: &Transaction<'_>,
     sealer: &Sealer,
@@ -65,8 +65,8 @@ fn bounds(champion: &Champion) -> [f64; 3] {
     [ci95, low, high]
 }
 
-/// The seal of a champion, whose lists and intervals are given as they are stored. It covers the end of
-/// the history, too, which has no checkpoint any more once the experiment has ended.
+/// The seal of a champion, from its stored lists and intervals. It also covers the end of the
+/// history, because an ended experiment has no checkpoint.
 #[expect(clippy::too_many_arguments, reason = "each is a part of what is sealed")]
 fn seal_of(
     sealer: &Sealer,
@@ -99,15 +99,15 @@ fn seal_of(
     seal.finish()
 }
 
-/// A champion as it is stored.
+/// A stored champion.
 struct Stored {
-    /// Without the lists.
+    /// The champion without its lists.
     champion: Champion,
     trial_fitness: String,
     genotype: String,
     seal: Vec<u8>,
-    /// Which of the ends of its intervals are NULL: older versions wrote that where they
-    /// could not compute one.
+    /// Which ends of its intervals are NULL: older versions wrote NULL where they could not
+    /// compute one.
     are_unknown: [bool; 3],
     /// The experiment's latest generation and the digest of everything so far.
     latest: Option<u64>,
@@ -177,13 +177,13 @@ impl Stored {
         self.seal_with(f64::NAN, sealer, id)
     }
 
-    /// Whether it is what was stored.
+    /// Whether the seal holds.
     fn is_sound(&self, sealer: &Sealer, id: ExperimentId) -> bool {
-        // Processors differ in the sign of what is not a number.
+        // Processors differ in the sign of NaN.
         [f64::NAN, -f64::NAN].iter().any(|&nan| self.seal_with(nan, sealer, id)[..] == self.seal)
     }
 
-    /// The seal that it has if the ends that are NULL were this.
+    /// The seal for this value in place of NULL.
     fn seal_with(&self, unknown: f64, sealer: &Sealer, id: ExperimentId) -> Seal {
         let Self { champion, trial_fitness, genotype, latest, digest, .. } = self;
         let mut bounds = bounds(champion);
@@ -196,7 +196,7 @@ impl Stored {
     }
 }
 
-/// Seals a champion as it is stored, if there is one.
+/// Seals the stored champion, if there is one.
 pub fn seal(
     transaction: &Transaction<'_>,
     sealer: &Sealer,
@@ -210,8 +210,8 @@ pub fn seal(
     Ok(())
 }
 
-/// Reads an experiment's champion; one that is not what was stored is damage.
-/// `sealer`: none if the database has no seals yet.
+/// Reads an experiment's champion; a broken seal is damage. `sealer`: `None` if the database has
+/// no seals yet.
 pub fn get(
     connection: &Connection,
     sealer: Option<&Sealer>,
@@ -229,7 +229,7 @@ pub fn get(
     Ok(Some(Champion { trial_fitness, genotype, ..stored.champion }))
 }
 
-/// The end of an interval; `unknown`: what an end that is NULL is as far as anybody knows.
+/// Reads the end of an interval; `unknown`: the value for NULL.
 fn bound(row: &Row<'_>, column: usize, unknown: f64) -> rusqlite::Result<Real> {
     match row.get_ref(column)? {
         ValueRef::Null => Ok(Real::new(unknown).expect("infinity is a number")),
@@ -237,7 +237,7 @@ fn bound(row: &Row<'_>, column: usize, unknown: f64) -> rusqlite::Result<Real> {
     }
 }
 
-/// JSON has no number for what is not finite, and its `null` could not be read again.
+/// JSON has no numbers for infinity and NaN, and a `null` could not be read back.
 fn to_json(values: &[f64]) -> rusqlite::Result<String> {
     if !values.iter().all(|value| value.is_finite()) {
         let what = "a list with a value that is not finite is not stored";

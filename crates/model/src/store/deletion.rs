@@ -1,25 +1,25 @@
-//! Deleting an experiment, and what it takes of the database.
+//! Deletes experiments, and measures their space in the database.
 
 use rusqlite::Transaction;
 
 use super::{Result, Store, StoreError, experiments, fitness_log, forks};
 use crate::ids::ExperimentId;
 
-/// The tables with rows of experiments, those that others refer to last.
+/// The tables with rows of experiments; referenced tables come last.
 const TABLES: [&str; 6] =
     ["fitness_log", "keyframes", "champions", "events", "generations", "forks"];
 
 impl Store {
-    /// Deletes an experiment that has ended, with all that belongs to it; its number is not
-    /// used again. [`StoreError::NeededByForks`] if it has forks. Returns how many bytes of the
-    /// database that frees.
+    /// Deletes an experiment that has ended, with all its data; its number is never used again.
+    /// Fails with [`StoreError::NeededByForks`] if it has forks. Returns the number of freed
+    /// bytes.
     pub fn delete(&mut self, id: ExperimentId) -> Result<u64> {
         self.write(|transaction, _| {
             let Some(found) = experiments::get(transaction, id)? else { return Ok(0) };
             if found.state.is_unfinished() {
                 return Err(StoreError::Unfinished(id));
             }
-            // Forks of forks lead here, too, so it is kept even if its own log is gone.
+            // Forks of forks also depend on it, so it is kept even if its own log is gone.
             forks::check_unneeded(transaction, id, 0)?;
             let free_before = free_len(transaction)?;
             for table in TABLES {
@@ -37,7 +37,7 @@ impl Store {
     }
 }
 
-/// Bytes of the database's pages that hold nothing.
+/// Bytes of the database's free pages.
 fn free_len(transaction: &Transaction<'_>) -> rusqlite::Result<u64> {
     let number = |sql: &str| transaction.query_row(sql, [], |row| row.get::<_, u64>(0));
     Ok(number("PRAGMA freelist_count")? * number("PRAGMA page_size")?)

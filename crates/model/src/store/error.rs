@@ -1,4 +1,4 @@
-//! What goes wrong with the store, with the next step.
+//! The errors of the store, each with the next step.
 
 use std::{
     io,
@@ -8,7 +8,7 @@ use std::{
 use super::file::Holder;
 use crate::ids::ExperimentId;
 
-/// What went wrong with the store.
+/// An error of the store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The directory cannot be created or written. Fix its path or permissions.
@@ -20,7 +20,7 @@ pub enum StoreError {
     Directory {
         /// The directory.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// Another coordinator uses the directory.
@@ -38,10 +38,10 @@ pub enum StoreError {
     Locked {
         /// The directory.
         path: PathBuf,
-        /// Who uses it, if that is known.
+        /// The program that uses it, if known.
         holder: Option<Holder>,
     },
-    /// Another coordinator has opened the database meanwhile, and owns it now.
+    /// Another coordinator has opened the database since, and owns it now.
     #[error(
         "another coordinator has taken over the data directory {}; this one stops and loses \
          nothing: run one coordinator per data directory",
@@ -62,7 +62,7 @@ pub enum StoreError {
         /// Version of this program.
         supported: i64,
     },
-    /// The database is of a version that is only read after it is migrated.
+    /// The database has an old version, which has to be migrated before it can be read.
     #[error(
         "{} has schema version {found}, which has no seals; start a coordinator on its directory \
          once, which migrates it",
@@ -74,19 +74,19 @@ pub enum StoreError {
         /// The database.
         path: PathBuf,
     },
-    /// The database was opened to be read.
+    /// The database was opened read-only.
     #[error("{} is only read", path.display())]
     ReadOnly {
         /// The database.
         path: PathBuf,
     },
-    /// The database's content makes no sense.
+    /// The database's content is invalid.
     #[error(
         "the database is damaged: {0}; restore it from a copy, or let \
          `swarmctl doctor --data-dir DIR` say what of it is sound"
     )]
     Corrupt(String),
-    /// The database is a copy of one in use, and lacks what was not in the copied file.
+    /// The database is a copy of one in use, and lacks the data outside the copied file.
     #[error(
         "{} is a copy of a database in use without its write-ahead log: the latest generations are \
          missing; copy it with `swarmctl backup`, or continue from what is there: \
@@ -98,7 +98,7 @@ pub enum StoreError {
         /// The database.
         path: PathBuf,
     },
-    /// What a run would continue from is not what was stored.
+    /// The state from which a run would continue differs from the stored one.
     #[error(
         "experiment {id} is damaged and does not continue: {what}; \
          `swarmctl doctor --data-dir {}` says what can be done",
@@ -107,30 +107,30 @@ pub enum StoreError {
     Unsound {
         /// The experiment.
         id: ExperimentId,
-        /// What is wrong.
+        /// The damage.
         what: String,
         /// The database.
         path: PathBuf,
     },
-    /// An experiment that has ended is sound, and has nothing to go on from.
+    /// An ended experiment is sound, but has no state from which it could continue.
     #[error(
         "experiment {0} has ended, and nothing is left that it could go on from: its fitness log was \
          damaged, or an older version kept none; submit its file again to have it computed anew"
     )]
     NoCheckpoint(ExperimentId),
-    /// There is nothing to look at or to copy.
+    /// There is no database to inspect or copy.
     #[error("there is no database {}; give the coordinator's --data-dir", path.display())]
     NoDatabase {
-        /// Where it would be.
+        /// The expected path.
         path: PathBuf,
     },
-    /// Nothing in a damaged database is worth a new data directory.
+    /// No experiment of a damaged database is sound enough for a new data directory.
     #[error("no experiment in {} is sound; restore a backup", path.display())]
     NothingSound {
         /// The database.
         path: PathBuf,
     },
-    /// A new data directory would be mixed with what is there.
+    /// The target of a new data directory is not empty.
     #[error("{} is not empty; choose a directory that does not exist yet", path.display())]
     NotEmpty {
         /// The directory.
@@ -141,10 +141,10 @@ pub enum StoreError {
     Target {
         /// The directory.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
-    /// The disk is full, or cannot be read or written, or memory is short; try again later.
+    /// The disk is full or fails, or memory is short; try again later.
     #[error(
         "the database cannot be read or written: {0}; is the disk full, or read-only, or memory \
          short?"
@@ -153,10 +153,10 @@ pub enum StoreError {
     /// The experiment has ended meanwhile.
     #[error("experiment {0} has ended")]
     Ended(ExperimentId),
-    /// The experiment has not ended, and goes on from its fitness log.
+    /// The experiment has not ended, and needs its fitness log to continue.
     #[error("experiment {0} has not ended, and goes on from its fitness log; prune it afterwards")]
     Unfinished(ExperimentId),
-    /// Forks of the experiment share generations with it that are nowhere else.
+    /// Forks of the experiment share generations with it that are stored nowhere else.
     #[error(
         "experiment {id} has generations of its {} in its fitness log, and nothing else has them; \
          to lose them, delete {} first: {}",
@@ -170,7 +170,7 @@ pub enum StoreError {
         /// Its forks, the latest first.
         forks: Vec<ExperimentId>,
     },
-    /// Anything else is a bug.
+    /// Any other error is a bug.
     #[error("the database refuses an operation: {0}; please report this")]
     Bug(rusqlite::Error),
 }
@@ -179,7 +179,7 @@ pub enum StoreError {
 pub type Result<T, E = StoreError> = std::result::Result<T, E>;
 
 impl StoreError {
-    /// Names the database that is damaged.
+    /// Adds the path of the damaged database.
     pub fn at(self, path: &Path) -> Self {
         match self {
             Self::Corrupt(what) => Self::Corrupt(format!("{}: {what}", path.display())),
@@ -195,11 +195,11 @@ impl From<rusqlite::Error> for StoreError {
             OutOfMemory, ReadOnly, SystemIoFailure,
         };
         let code = error.sqlite_error_code();
-        // Any statement may say so, whatever it says of its tables.
+        // Any statement may report this.
         if code == Some(OutOfMemory) {
             return Self::Unavailable(error);
         }
-        // Every query asks for the types of the schema, and for rows that must exist.
+        // Every query uses the types of the schema, and expects rows that must exist.
         if matches!(
             error,
             rusqlite::Error::FromSqlConversionFailure(..)
@@ -210,8 +210,8 @@ impl From<rusqlite::Error> for StoreError {
         ) {
             return Self::Corrupt(error.to_string());
         }
-        // Statements are right for the schema: tables of another one are damage, or another
-        // program's. What SQLite says begins with the fault, and ends with the whole statement.
+        // Statements fit the schema, so other tables are damage, or belong to another program.
+        // SQLite's message begins with the fault, and ends with the whole statement.
         let missing = match &error {
             rusqlite::Error::SqlInputError { msg, .. } => Some(msg),
             rusqlite::Error::SqliteFailure(_, Some(msg)) if msg.starts_with("no such") => Some(msg),

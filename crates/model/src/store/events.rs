@@ -5,8 +5,7 @@ use rusqlite::{Transaction, params};
 use super::ExperimentState;
 use crate::ids::ExperimentId;
 
-/// Changes the state of an unfinished experiment, or the reason of a pause, and says so among its
-/// events.
+/// Changes the state of an unfinished experiment, or the reason of a pause, and adds an event.
 pub fn set_state(
     transaction: &Transaction<'_>,
     id: ExperimentId,
@@ -43,14 +42,14 @@ pub fn add_state_event(
     Ok(())
 }
 
-/// Adds a line to an experiment's events.
+/// Adds a notice to an experiment's events.
 pub fn add_notice(
     transaction: &Transaction<'_>,
     id: ExperimentId,
     now_ms: u64,
     text: &str,
 ) -> rusqlite::Result<()> {
-    // Of an experiment that is deleted, nothing is worth a line.
+    // A deleted experiment gets no notices.
     transaction.execute(
         "INSERT INTO events (experiment_id, sequence, at_ms, kind, message)
          SELECT ?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),

@@ -1,5 +1,4 @@
-//! Ended experiments with everything that their results follow from: out of a database, and
-//! into another one.
+//! Exports and imports ended experiments with everything from which their results follow.
 
 use bundle::Bundle;
 use evolution::Champion;
@@ -12,26 +11,25 @@ use super::{
 };
 use crate::{ids::ExperimentId, priority::Priority};
 
-/// An experiment of a bundle, of which everything that can be proven has been.
+/// An experiment of a verified bundle.
 #[derive(Debug)]
 pub struct Imported {
     /// The bundle.
     pub bundle: Bundle,
     /// Name for display.
     pub name: String,
-    /// Genes of a genotype.
+    /// Number of genes of a genotype.
     pub genotype_len: usize,
     /// How it ended.
     pub state: ExperimentState,
     /// Its champion.
     pub champion: Option<Champion>,
-    /// Where it comes from, if it is a fork.
+    /// Its origin, if it is a fork.
     pub fork: Option<ForkRecord>,
 }
 
 impl Store {
-    /// Everything that an experiment's results follow from; a part that is not what was stored
-    /// is damage.
+    /// Everything from which an experiment's results follow; a broken seal is damage.
     pub fn evidence(&self, experiment: &ExperimentRecord) -> Result<Evidence> {
         let id = experiment.id;
         let history = self.generations(id, 0, u32::MAX)?;
@@ -50,7 +48,7 @@ impl Store {
         })
     }
 
-    /// Adds an ended experiment, unless it is there already: then returns that one.
+    /// Adds an ended experiment, or returns the existing one with the same bits.
     pub fn import(&mut self, imported: &Imported, now_ms: u64) -> Result<(ExperimentId, bool)> {
         if let Some(id) = self.same_as(&imported.bundle)? {
             return Ok((id, false));
@@ -63,7 +61,7 @@ impl Store {
         })
     }
 
-    /// The experiment of a bundle, if it is here.
+    /// The experiment of a bundle, if the database has it.
     fn same_as(&self, bundle: &Bundle) -> Result<Option<ExperimentId>> {
         let manifest = &bundle.manifest;
         let (config_digest, digest) =

@@ -1,4 +1,4 @@
-//! Experiments as their rows have them, with their latest generation.
+//! Reads rows of experiments, with their latest generation.
 
 use rusqlite::{Connection, OptionalExtension, Row, params_from_iter, types::Value};
 
@@ -9,33 +9,33 @@ use super::{
     error::Result, history, labels,
 };
 
-/// Which experiments a list has: those that are all of what is said here.
+/// Filters of a list of experiments, which must pass all of them.
 #[derive(Debug, Clone, Default)]
 pub struct Filter {
-    /// Of the group of this name, or, if there is none, the experiments of this name.
+    /// In the group of this name, or, if no group has it, with this name themselves.
     pub named: Option<String>,
     /// In one of these states; empty: in any.
     pub states: Vec<ExperimentState>,
-    /// With each of these labels, with any value or with this one.
+    /// With all of these labels, each with any value or with the given one.
     pub labels: Vec<(String, Option<String>)>,
-    /// Whether those that are archived are left out.
+    /// Whether to leave out archived experiments.
     pub without_archived: bool,
-    /// Of the file with this digest.
+    /// With this digest of the file.
     pub config_digest: Option<String>,
-    /// Those with larger numbers.
+    /// With numbers larger than this one.
     pub after: u64,
-    /// At most so many, those with the smallest numbers; none: all.
+    /// Most experiments to list, those with the smallest numbers; `None`: no limit.
     pub limit: Option<u32>,
 }
 
 impl Filter {
-    /// Those that have not ended.
+    /// The filter for experiments that have not ended.
     pub fn unfinished() -> Self {
         let states = vec![ExperimentState::Running, ExperimentState::Paused];
         Self { states, ..Self::default() }
     }
 
-    /// The condition, and what its `?` stand for.
+    /// The condition in SQL, and the values of its `?`.
     fn condition(&self) -> (String, Vec<Value>) {
         let (mut conditions, mut values) = (Vec::new(), Vec::<Value>::new());
         let mut add = |condition: String, of: Vec<Value>| {
@@ -80,7 +80,7 @@ impl Filter {
     }
 }
 
-/// One of them, with its file.
+/// One experiment, with its file.
 pub fn get(connection: &Connection, id: ExperimentId) -> Result<Option<StoredExperiment>> {
     if i64::try_from(id.0).is_err() {
         return Ok(None); // SQLite's integers are signed.
@@ -92,7 +92,7 @@ pub fn get(connection: &Connection, id: ExperimentId) -> Result<Option<StoredExp
     Ok(Some(StoredExperiment { record: record?, config_json }))
 }
 
-/// Those that are wanted, oldest first.
+/// The experiments that pass a filter, oldest first.
 pub fn list(connection: &Connection, filter: &Filter) -> Result<Vec<ExperimentRecord>> {
     let (condition, values) = filter.condition();
     let limit = filter.limit.map_or(-1, i64::from);
@@ -169,7 +169,7 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Result<ExperimentRecord>> {
     }))
 }
 
-/// The place in a group that a row has.
+/// The membership in a row.
 fn membership(group: Option<String>, variant: Option<String>) -> Option<Membership> {
     group.map(|group| Membership { group, variant: variant.unwrap_or_default() })
 }

@@ -1,5 +1,5 @@
-//! The database's file: one coordinator at a time, created whole or not at all,
-//! and never touched if it is not sound.
+//! The database's file: it has one writer at a time, is created completely or not at all, and
+//! stays untouched if it is damaged.
 
 use std::{
     fmt,
@@ -16,20 +16,20 @@ use super::{Result, StoreError, schema, write_ahead_log};
 use crate::text::printable;
 
 const DATABASE_FILE: &str = "swarmevo.sqlite3";
-/// What a database is called until it is complete.
+/// The name of a database until it is complete.
 const UNFINISHED_FILE: &str = "swarmevo.sqlite3.new";
 const LOCK_FILE: &str = "swarmevo.lock";
-/// How long an operation waits for another program that uses the database.
+/// Longest time that an operation waits for another program that uses the database.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// How long a lock is tried: another program may look for a moment whether it is taken.
+/// Number of attempts to lock: another program may hold the lock for a moment to test it.
 const LOCK_ATTEMPTS: u32 = 10;
 /// Pause between two attempts.
 const LOCK_PAUSE: Duration = Duration::from_millis(20);
 /// Longest text in a lock file, bytes.
 const HOLDER_LEN_MAX: u64 = 512;
 
-/// Fails if there is no database there, or none that can be seen.
+/// Fails if there is no database at `path`, or if it cannot be accessed.
 pub fn must_exist(path: &Path) -> Result<()> {
     match fs::metadata(path) {
         Ok(found) if found.is_file() => Ok(()),
@@ -41,7 +41,7 @@ pub fn must_exist(path: &Path) -> Result<()> {
     }
 }
 
-/// What keeps other coordinators out, for as long as it is kept.
+/// The locks that keep other coordinators out until they are dropped.
 #[derive(Debug)]
 pub struct Locks {
     directory: File,
@@ -51,14 +51,14 @@ pub struct Locks {
 /// The program that may write to a database.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Holder {
-    /// Number of its process, if it is known.
+    /// Its process id, if known.
     pub process: Option<u32>,
-    /// Where clients reach it, if it is a coordinator.
+    /// Its address for clients, if it is a coordinator.
     pub address: Option<String>,
 }
 
 impl Locks {
-    /// Says in the lock file whose it is. A lock without a name is as good.
+    /// Writes the holder's name into the lock file. A lock without a name is as good.
     pub fn announce(&self, address: Option<&str>) {
         let text = format!("{}\n{}\n", std::process::id(), address.unwrap_or_default());
         let mut file = &self.directory;
@@ -71,11 +71,11 @@ impl Locks {
 }
 
 impl Holder {
-    /// Who is named in a lock file.
+    /// Reads the holder from a lock file.
     fn named(file: &File) -> Self {
         let mut text = String::new();
         let mut file = file;
-        // What cannot be read names nobody.
+        // An unreadable file names no holder.
         let _ = file.seek(SeekFrom::Start(0));
         let _ = file.take(HOLDER_LEN_MAX).read_to_string(&mut text);
         let mut lines = text.lines();
@@ -96,7 +96,7 @@ impl fmt::Display for Holder {
     }
 }
 
-/// The program that may write to the database in a directory, if one is there now.
+/// The program that may write to the database in a directory, if one runs now.
 pub fn holder(directory: &Path) -> Option<Holder> {
     let is_locked = |file: &File| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
     let lock = File::open(directory.join(LOCK_FILE)).ok();
@@ -112,13 +112,12 @@ pub fn path_in(directory: &Path) -> PathBuf {
     directory.join(DATABASE_FILE)
 }
 
-/// What a database is called until it is complete.
+/// The path of a database until it is complete.
 pub fn unfinished_in(directory: &Path) -> PathBuf {
     directory.join(UNFINISHED_FILE)
 }
 
-/// Opens, and if need be creates, the database in `directory`. Drop the connection
-/// before the locks.
+/// Opens the database in `directory`, or creates it. Drop the connection before the locks.
 pub fn open(directory: &Path) -> Result<(Connection, Locks)> {
     let unusable = |source| StoreError::Directory { path: directory.to_owned(), source };
     fs::create_dir_all(directory).map_err(unusable)?;
@@ -142,9 +141,9 @@ pub fn open(directory: &Path) -> Result<(Connection, Locks)> {
     Ok((connection, locks))
 }
 
-/// Locks the database itself: a lock file can be deleted while it is locked.
+/// Locks the database itself, because a locked lock file can be deleted.
 fn lock_database(path: &Path, directory: &Path) -> Result<Option<File>> {
-    // Elsewhere this may be one and the same lock as those by which SQLite lets others read.
+    // On other systems, this lock may conflict with SQLite's own locks for readers.
     if !cfg!(target_os = "linux") {
         return Ok(None);
     }
@@ -153,7 +152,7 @@ fn lock_database(path: &Path, directory: &Path) -> Result<Option<File>> {
     lock(file, directory).map(Some)
 }
 
-/// Locks a file of the data directory, or says that another has it.
+/// Locks a file of the data directory, or returns that another program has it.
 fn lock(file: File, directory: &Path) -> Result<File> {
     let path = directory.to_owned();
     for attempt in 1.. {
@@ -171,8 +170,8 @@ fn lock(file: File, directory: &Path) -> Result<File> {
     Ok(file)
 }
 
-/// Creates an empty database. Under another name at first, so that an empty file
-/// under the right one is damage, and not a coordinator killed at its first start.
+/// Creates an empty database, under another name at first. So an empty file under the final name
+/// is damage, and never the result of a kill at the first start.
 fn create(directory: &Path, unusable: impl Fn(io::Error) -> StoreError) -> Result<()> {
     let unfinished = unfinished_in(directory);
     match fs::remove_file(&unfinished) {
@@ -185,8 +184,8 @@ fn create(directory: &Path, unusable: impl Fn(io::Error) -> StoreError) -> Resul
     publish(directory).map_err(unusable)
 }
 
-/// Refuses a database that this program must not write to. Read-only, so that
-/// whoever repairs it finds every byte as it was.
+/// Refuses a database to which this program must not write. The check is read-only, so that every
+/// byte stays for a repair.
 fn check(path: &Path) -> Result<()> {
     let has_log = write_ahead_log::exists(path);
     let verdict = open_read_only(path).map_err(StoreError::from).and_then(|connection| {
@@ -210,13 +209,14 @@ fn check(path: &Path) -> Result<()> {
     verdict.map_err(|error| error.at(path))
 }
 
-/// Opens a database to read it, whoever else uses it, and leaves nothing beside it.
+/// Opens a database for reading, even while another program uses it, and leaves no files beside
+/// it.
 pub fn open_read_only(path: &Path) -> rusqlite::Result<Connection> {
     let mut flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let connection = if write_ahead_log::exists(path) {
         Connection::open_with_flags(path, flags)?
     } else {
-        // Without a log nobody uses it; SQLite would create one.
+        // Without a log, no program uses the database; SQLite would create a log.
         flags |= OpenFlags::SQLITE_OPEN_URI;
         Connection::open_with_flags(format!("{}?immutable=1", uri(path)), flags)?
     };
@@ -224,7 +224,7 @@ pub fn open_read_only(path: &Path) -> rusqlite::Result<Connection> {
     Ok(connection)
 }
 
-/// A path as SQLite reads it in a URI.
+/// A path in the notation of SQLite's URIs.
 fn uri(path: &Path) -> String {
     let mut uri = "file:".to_owned();
     for &byte in path.as_os_str().as_encoded_bytes() {
@@ -237,7 +237,7 @@ fn uri(path: &Path) -> String {
     uri
 }
 
-/// Makes a complete database of the one that is called [`unfinished_in`] so far.
+/// Renames the database at [`unfinished_in`], which is complete, to its final name.
 pub fn publish(directory: &Path) -> io::Result<()> {
     let unfinished = unfinished_in(directory);
     File::open(&unfinished)?.sync_all()?;

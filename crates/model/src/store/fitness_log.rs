@@ -1,8 +1,8 @@
 //! The tables of the fitness log and of its keyframes.
 //!
-//! Of an experiment's generations, those from `experiments.log_from` on are in the log, without
-//! gaps, and there is a keyframe before the first of them. Others come in between. So there is
-//! a checkpoint of every state since.
+//! The log has an experiment's generations from `experiments.log_from` on, without gaps, and a
+//! keyframe before the first of them. Further keyframes come in between. So every later state has
+//! a checkpoint.
 
 use bundle::Keyframes;
 use evolution::{Checkpoint, FLAT_COUNTED_MAX, Told};
@@ -14,16 +14,16 @@ use super::{
 };
 use crate::ids::ExperimentId;
 
-/// What a generation adds.
+/// The data that a generation adds.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry<'a> {
-    /// What evolution was told, as [`evolution::Told::to_bytes`] writes it.
+    /// The fitness of the generation, as bytes of [`evolution::Told::to_bytes`].
     pub told: &'a [u8],
-    /// Evolution after it, where a keyframe is due.
+    /// The state of evolution after it, if a keyframe is due.
     pub keyframe: Option<&'a [u8]>,
 }
 
-/// The seals of an entry, made before the transaction.
+/// The seals of an entry, computed before the transaction.
 #[derive(Debug, Clone, Copy)]
 pub struct EntrySeals {
     told: Seal,
@@ -55,7 +55,7 @@ impl Entry<'_> {
     }
 }
 
-/// Adds what evolution was told of a generation.
+/// Adds the fitness of a generation.
 pub fn put_told(
     transaction: &Transaction<'_>,
     id: ExperimentId,
@@ -69,7 +69,7 @@ pub fn put_told(
     Ok(())
 }
 
-/// Adds a keyframe, which follows so many generations.
+/// Adds a keyframe; `n_generations`: number of generations before it.
 pub fn put_keyframe(
     transaction: &Transaction<'_>,
     id: ExperimentId,
@@ -83,8 +83,8 @@ pub fn put_keyframe(
     Ok(())
 }
 
-/// The checkpoint after so many generations, or none if there is none that is what was stored.
-/// `sealer`: none if the database has no seals yet.
+/// The checkpoint after this many generations; `None` if it is missing or has a broken seal.
+/// `sealer`: `None` if the database has no seals yet.
 pub fn checkpoint(
     connection: &Connection,
     sealer: Option<&Sealer>,
@@ -134,7 +134,8 @@ pub fn checkpoint(
     Ok(Some(Checkpoint { keyframe, log, n_flat }))
 }
 
-/// How many generations before this one, without a gap, told nobody apart, as far as the log says.
+/// Number of generations directly before this one in which all individuals had equal fitness, as
+/// far as the log shows.
 fn n_flat_before(connection: &Connection, id: ExperimentId, end: u64) -> rusqlite::Result<u64> {
     let mut statement = connection.prepare_cached(
         "SELECT generation, best = min, told
@@ -144,7 +145,7 @@ fn n_flat_before(connection: &Connection, id: ExperimentId, end: u64) -> rusqlit
     let mut rows = statement.query(params![id.0, end, FLAT_COUNTED_MAX])?;
     let mut n_flat = 0;
     while let Some(row) = rows.next()? {
-        // Whose fitness is not finite is in no statistics, so that what was told decides.
+        // Statistics omit individuals without finite fitness, so the log decides.
         let is_flat = row.get::<_, u64>(0)? + n_flat + 1 == end
             && row.get(1)?
             && Told::from_bytes(row.get_ref(2)?.as_blob()?).is_ok_and(|told| told.is_flat());
@@ -156,7 +157,7 @@ fn n_flat_before(connection: &Connection, id: ExperimentId, end: u64) -> rusqlit
     Ok(n_flat)
 }
 
-/// Whether the log says nothing of a generation from this one on.
+/// Whether the log has no generation from this one on.
 pub fn ends_at(connection: &Connection, id: ExperimentId, end: u64) -> rusqlite::Result<bool> {
     let sql = "SELECT NOT EXISTS (SELECT 1 FROM fitness_log
                                   WHERE experiment_id = ?1 AND generation >= ?2)
@@ -165,7 +166,7 @@ pub fn ends_at(connection: &Connection, id: ExperimentId, end: u64) -> rusqlite:
     connection.prepare_cached(sql)?.query_row(params![id.0, end], |row| row.get(0))
 }
 
-/// What evolution was told of a generation, if that is in the log and is what was stored.
+/// The fitness of a generation, if it is in the log with an intact seal.
 pub fn told(
     connection: &Connection,
     sealer: Option<&Sealer>,
@@ -183,8 +184,8 @@ pub fn told(
     }))
 }
 
-/// All keyframes by the number of generations before them, in order; none if one is not what
-/// was stored.
+/// All keyframes with the number of generations before them, in order; `None` if a seal is
+/// broken.
 pub fn keyframes(
     connection: &Connection,
     sealer: &Sealer,
@@ -209,7 +210,7 @@ pub fn keyframes(
     Ok(Some(keyframes))
 }
 
-/// Says from which generation on the log is, and why not from the first.
+/// Sets the first generation of the log, and why it is not generation 0.
 pub fn begin_at(
     transaction: &Transaction<'_>,
     id: ExperimentId,
@@ -221,7 +222,7 @@ pub fn begin_at(
     Ok(())
 }
 
-/// Deletes an experiment's log and all its keyframes. Returns how many bytes that were.
+/// Deletes an experiment's log and all its keyframes. Returns their size in bytes.
 pub fn delete(transaction: &Transaction<'_>, id: ExperimentId) -> rusqlite::Result<u64> {
     let n_bytes = len(transaction, id)?;
     for table in ["fitness_log", "keyframes"] {
@@ -239,8 +240,8 @@ pub fn len(connection: &Connection, id: ExperimentId) -> rusqlite::Result<u64> {
     connection.query_row(sql, [id.0], |row| row.get(0))
 }
 
-/// Seals an experiment's only keyframe as it is stored, in a database that has no log yet.
-/// `latest`: the generation that it follows.
+/// Seals an experiment's only keyframe, in a database that has no log yet. `latest`: the
+/// generation before it.
 pub fn seal(
     transaction: &Transaction<'_>,
     sealer: &Sealer,

@@ -8,16 +8,16 @@ use super::{
 };
 use crate::ids::ExperimentId;
 
-/// Where an experiment comes from that goes on from the state of another one.
+/// The origin of a fork, an experiment that continues the state of another one, its parent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ForkRecord {
-    /// The other one.
+    /// The parent.
     pub parent: ExperimentId,
-    /// The last generation that it shares with that.
+    /// The last generation that it shares with the parent.
     pub generation: u64,
-    /// The link of the digest chain on which its own first generation hangs.
+    /// The link of the digest chain before its own first generation.
     pub link: String,
-    /// What is changed, one line each.
+    /// The changes of the experiment file, one line each.
     pub changes: Vec<String>,
 }
 
@@ -32,7 +32,7 @@ pub fn check_unneeded(connection: &Connection, id: ExperimentId, first: u64) -> 
     if forks.is_empty() { Ok(()) } else { Err(StoreError::NeededByForks { id, forks }) }
 }
 
-/// Adds where an experiment comes from.
+/// Adds the origin of a fork.
 pub fn put(
     transaction: &Transaction<'_>,
     sealer: &Sealer,
@@ -49,8 +49,7 @@ pub fn put(
     Ok(())
 }
 
-/// Gives a new experiment the generations that it shares with its parent, and when they were
-/// completed.
+/// Copies to a new fork the history that it shares with its parent, with the times of completion.
 pub fn copy_history(
     transaction: &Transaction<'_>,
     sealer: &Sealer,
@@ -71,8 +70,8 @@ pub fn copy_history(
     fitness_log::begin_at(transaction, id, fork.generation + 1, LogGap::Forked)
 }
 
-/// Where an experiment comes from, if it is a fork; something that is not what was stored is
-/// damage. `sealer`: none if the database has no seals yet.
+/// The origin of an experiment, if it is a fork; a broken seal is damage. `sealer`: `None` if the
+/// database has no seals yet.
 pub fn get(
     connection: &Connection,
     sealer: Option<&Sealer>,

@@ -1,4 +1,4 @@
-//! What has happened to an experiment: its events and its generations.
+//! The history of an experiment: its events and its generations.
 
 use rusqlite::{Connection, Row, Transaction, params, types::Type};
 
@@ -45,8 +45,8 @@ impl Store {
         })
     }
 
-    /// At most `limit` completed generations from `from_generation` on, and when
-    /// they were completed, in milliseconds since 1970 UTC.
+    /// At most `limit` completed generations from `from_generation` on, each with its time of
+    /// completion in milliseconds since 1970 UTC.
     pub fn generations(
         &self,
         id: ExperimentId,
@@ -54,8 +54,8 @@ impl Store {
         limit: u32,
     ) -> Result<Vec<(u64, GenerationRecord)>> {
         self.read(|connection| {
-            // Events begin with the submission, and every generation has one: those of
-            // earlier generations need not be looked at.
+            // Events begin with the submission, and every generation has one, so the query can
+            // skip events of earlier generations.
             let mut statement = connection.prepare_cached(
             "SELECT v.at_ms, g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
                     g.duration_ms, g.episodes, g.workers, g.idle_share
@@ -131,7 +131,7 @@ pub fn read_all(
     read(connection, id, 0, i64::MAX.unsigned_abs())
 }
 
-/// An experiment's generations from `first` to `end`, without that, in order.
+/// An experiment's generations in `first..end`, in order.
 pub fn read_between(
     connection: &Connection,
     id: ExperimentId,
@@ -156,13 +156,13 @@ fn read(
     )?;
     let read = |row: &Row<'_>| Ok((read_generation(row, 1)?, row.get(0)?));
     let rows = statement.query_map(params![id.0, first, end], read)?;
-    // No outer join: there is a generation in every row.
+    // Without an outer join, every row has a generation.
     rows.filter_map(|row| row.map(|(generation, seal)| Some((generation?, seal))).transpose())
         .collect()
 }
 
-/// Reads the columns of `generations`, in the schema's order, from `first` on;
-/// none if an outer join found no row.
+/// Reads the columns of `generations`, in the schema's order, from column `first` on; `None` if
+/// an outer join found no row.
 pub fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<GenerationRecord>> {
     let Some(generation) = row.get(first)? else { return Ok(None) };
     Ok(Some(GenerationRecord {
@@ -181,7 +181,7 @@ pub fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<G
     }))
 }
 
-/// A column that has a number. SQLite keeps NaN as NULL, so there is none of it to be read.
+/// Reads a number. SQLite stores NaN as NULL, so the number is never NaN.
 pub fn real(row: &Row<'_>, column: usize) -> rusqlite::Result<Real> {
     let number: f64 = row.get(column)?;
     Real::try_from(number).map_err(|error| {

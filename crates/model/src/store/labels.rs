@@ -1,4 +1,4 @@
-//! The columns of experiments that are people's: labels and the archive.
+//! The columns of experiments that belong to people: labels and the archive.
 
 use rusqlite::params;
 
@@ -15,8 +15,8 @@ impl Store {
         })
     }
 
-    /// Marks an experiment that has ended as archived, or not; one that goes on stays as it
-    /// is.
+    /// Marks an ended experiment as archived, or removes the mark; leaves an unfinished one
+    /// alone.
     pub fn set_archived(&mut self, id: ExperimentId, is_archived: bool) -> Result<()> {
         self.write(|transaction, _| {
             let sql = "UPDATE experiments SET archived = ?2
@@ -27,13 +27,13 @@ impl Store {
     }
 }
 
-/// Labels as the database has them.
+/// Labels in the format of the database.
 pub fn to_json(labels: &Labels) -> String {
     serde_json::to_string(labels).expect("text serialises")
 }
 
-/// Reads labels. What is none is not worth that an experiment cannot be read: no result
-/// depends on it.
+/// Reads labels. Ignores invalid ones, because no result depends on them, and the experiment
+/// should stay readable.
 pub fn from_json(json: &str) -> Labels {
     serde_json::from_str(json).unwrap_or_default()
 }

@@ -1,8 +1,8 @@
-//! The coordinator's memory: a SQLite database that holds every completed
-//! generation, and from which a killed coordinator goes on.
+//! The coordinator's memory: a SQLite database with every completed generation, from which a
+//! killed coordinator continues.
 //!
-//! Every method that changes something is one transaction, on disk when it
-//! returns, and refused if another coordinator owns the database by now.
+//! Every method that changes data is one transaction. It is on disk when the method returns, and
+//! fails if another coordinator owns the database by now.
 
 mod champions;
 mod deletion;
@@ -61,33 +61,33 @@ pub struct Store {
     path: PathBuf,
     /// Makes the seals of its rows.
     sealer: Sealer,
-    /// None if it is only read.
+    /// `None` if the database is only read.
     ownership: Option<Ownership>,
 }
 
-/// What lets a coordinator write.
+/// A coordinator's right to write.
 #[derive(Debug)]
 struct Ownership {
-    /// What the database says as long as this coordinator owns it.
+    /// The owner's token; the database has the same one while this coordinator owns it.
     owner: Vec<u8>,
     /// Released after the connection.
     locks: Locks,
 }
 
-/// A generation to be committed.
+/// A generation to commit.
 #[derive(Debug, Clone)]
 pub struct GenerationCommit<'a> {
     /// History row.
     pub generation: &'a GenerationRecord,
-    /// What it adds to the fitness log.
+    /// Its entry in the fitness log.
     pub entry: Entry<'a>,
-    /// The champion so far.
+    /// The present champion.
     pub champion: Option<&'a Champion>,
-    /// Covers all generations and re-evaluations so far.
+    /// The digest that covers all generations and re-evaluations so far.
     pub digest: &'a str,
-    /// Things worth a line.
+    /// Notices for the events.
     pub notices: &'a [String],
-    /// Whether this was the last generation, and why.
+    /// Why the run is over, if this is the last generation.
     pub completed: Option<&'a str>,
 }
 
@@ -102,8 +102,7 @@ pub fn must_be_in(directory: &Path) -> Result<()> {
 }
 
 impl Store {
-    /// Opens, and if need be creates, the database in `directory`, and takes it over
-    /// from whoever owned it.
+    /// Opens the database in `directory`, or creates it, and takes it over from its former owner.
     pub fn open(directory: &Path) -> Result<Self> {
         let (connection, locks) = file::open(directory)?;
         let path = file::path_in(directory);
@@ -112,8 +111,8 @@ impl Store {
         Ok(Self { connection, path, sealer, ownership: Some(Ownership { owner, locks }) })
     }
 
-    /// Opens the database in `directory` to read it, whether or not a coordinator uses it. It
-    /// may be of an earlier version, but for those without seals.
+    /// Opens the database in `directory` for reading, whether or not a coordinator uses it.
+    /// Earlier versions are accepted if they have seals.
     pub fn open_read_only(directory: &Path) -> Result<Self> {
         must_be_in(directory)?;
         let path = file::path_in(directory);
@@ -136,15 +135,15 @@ impl Store {
         Ok(Self { connection, path, sealer, ownership: None })
     }
 
-    /// Tells other programs that want the directory where clients reach this one.
+    /// Announces the address of this program to other programs that want the directory.
     pub fn announce(&self, address: &str) {
         if let Some(Ownership { locks, .. }) = &self.ownership {
             locks.announce(Some(address));
         }
     }
 
-    /// Adds an experiment. If `request_id` has been used before, nothing is
-    /// added and the id of that experiment is returned.
+    /// Adds an experiment. If an earlier experiment has the same `request_id`, adds nothing and
+    /// returns the earlier id.
     pub fn create(&mut self, new: &NewExperiment, now_ms: u64) -> Result<(ExperimentId, bool)> {
         if let Some(request_id) = &new.request_id
             && let Some(id) = self.experiment_of_request(request_id)?
@@ -194,7 +193,7 @@ impl Store {
         })
     }
 
-    /// The experiment that was created under a client's key.
+    /// The experiment that a client created with this key.
     pub fn experiment_of_request(&self, request_id: &str) -> Result<Option<ExperimentId>> {
         self.read(|connection| {
             let mut statement =
@@ -203,9 +202,9 @@ impl Store {
         })
     }
 
-    /// Commits a generation with everything that belongs to it;
-    /// [`StoreError::Ended`] if the experiment has ended. One that was paused after
-    /// its generation had been evaluated keeps the generation, and stays paused.
+    /// Commits a generation with its state, fitness log and champion. Fails with
+    /// [`StoreError::Ended`] if the experiment has ended. An experiment that was paused after the
+    /// evaluation gets the generation, and stays paused.
     pub fn commit_generation(
         &mut self,
         id: ExperimentId,
@@ -213,7 +212,7 @@ impl Store {
         commit: &GenerationCommit<'_>,
     ) -> Result<()> {
         let generation = commit.generation;
-        // Hashing takes longer than the rest, and needs no transaction.
+        // Hashing takes longest, and needs no transaction.
         let seals = commit.entry.seals(&self.sealer, id, generation);
         self.write(|transaction, sealer| {
             let state: Option<String> = transaction
@@ -257,8 +256,8 @@ impl Store {
         })
     }
 
-    /// Changes the state of an unfinished experiment, or the reason of a pause; one that
-    /// has ended, or is in that state already, stays as it is.
+    /// Changes the state of an unfinished experiment, or the reason of a pause. Does nothing if
+    /// the experiment has ended or is in that state already.
     pub fn set_state(
         &mut self,
         id: ExperimentId,
@@ -269,8 +268,7 @@ impl Store {
         self.write(|transaction, _| Ok(set_state(transaction, id, now_ms, state, reason)?))
     }
 
-    /// Changes the priority of an unfinished experiment; one that has ended stays
-    /// as it is.
+    /// Changes the priority of an unfinished experiment; does nothing if it has ended.
     pub fn set_priority(&mut self, id: ExperimentId, priority: Priority) -> Result<()> {
         self.write(|transaction, _| {
             transaction.execute(
@@ -282,14 +280,13 @@ impl Store {
         })
     }
 
-    /// Adds a line to an experiment's events.
+    /// Adds a notice to an experiment's events.
     pub fn notice(&mut self, id: ExperimentId, now_ms: u64, text: &str) -> Result<()> {
         self.write(|transaction, _| Ok(add_notice(transaction, id, now_ms, text)?))
     }
 
-    /// Lets an experiment go on that has ended in the state `from`, under a configuration
-    /// that may ask for more generations; one that is in another state stays as it is.
-    /// `why`: for its events.
+    /// Reopens an experiment that has ended in the state `from`, with a configuration that may
+    /// have more generations. Does nothing in another state. `why`: for its events.
     pub fn reopen(
         &mut self,
         id: ExperimentId,
@@ -312,9 +309,9 @@ impl Store {
         })
     }
 
-    /// Deletes the fitness log of an experiment that has ended, unless forks share generations
-    /// of it ([`StoreError::NeededByForks`]). `keyframe`: evolution as it is
-    /// now, from which more generations would continue. Returns how many bytes are free.
+    /// Deletes the fitness log of an experiment that has ended, unless forks share generations of
+    /// it ([`StoreError::NeededByForks`]). `keyframe`: the latest state of evolution, from which
+    /// more generations would continue. Returns the number of free bytes.
     pub fn prune(&mut self, id: ExperimentId, keyframe: Option<&[u8]>, now_ms: u64) -> Result<u64> {
         self.write(|transaction, sealer| {
             let Some(found) = experiments::get(transaction, id)? else { return Ok(0) };
@@ -342,8 +339,8 @@ impl Store {
         self.read(|connection| experiments::get(connection, id))
     }
 
-    /// What a generation is computed again from: the checkpoint before it and what evolution
-    /// was told of it; none if that is not in the log, or is not what was stored.
+    /// The data from which a generation is recomputed: the checkpoint before it, and its fitness;
+    /// `None` if the log lacks it, or if a seal is broken.
     pub fn generation_in_log(
         &self,
         id: ExperimentId,
@@ -359,8 +356,8 @@ impl Store {
         })
     }
 
-    /// What evolution was told of at most `limit` complete generations from `from` on; none
-    /// for one that is not what was stored.
+    /// The fitness of at most `limit` complete generations from `from` on; `None` for one with a
+    /// broken seal.
     pub fn fitness_log(
         &self,
         id: ExperimentId,
@@ -375,8 +372,7 @@ impl Store {
         })
     }
 
-    /// The fitness log of the generations from `first` to `end`, without that; none if it is not
-    /// what was stored.
+    /// The fitness log of the generations in `first..end`; `None` if a seal is broken.
     pub fn log_between(
         &self,
         id: ExperimentId,
@@ -394,17 +390,17 @@ impl Store {
         })
     }
 
-    /// Reads the experiments that a filter lets through, oldest first.
+    /// Reads the experiments that pass a filter, oldest first.
     pub fn experiments(&self, filter: &Filter) -> Result<Vec<ExperimentRecord>> {
         self.read(|connection| experiments::list(connection, filter))
     }
 
-    /// The champion so far; none before the first generation.
+    /// The present champion; `None` before the first generation.
     pub fn champion(&self, id: ExperimentId) -> Result<Option<Champion>> {
         self.read(|connection| champions::get(connection, Some(&self.sealer), id))
     }
 
-    /// Reads.
+    /// Runs a query.
     fn read<T>(&self, query: impl FnOnce(&Connection) -> Result<T>) -> Result<T> {
         query(&self.connection).map_err(|error| error.at(&self.path))
     }
@@ -415,7 +411,7 @@ impl Store {
         operation: impl FnOnce(&Transaction<'_>, &Sealer) -> Result<T>,
     ) -> Result<T> {
         let result = self.transact(operation).map_err(|error| error.at(&self.path))?;
-        // What is written is on disk anyway; the next write tries again.
+        // The write is on disk anyway; the next one tries this again.
         let _ = write_ahead_log::fold_if_long(&self.connection);
         Ok(result)
     }

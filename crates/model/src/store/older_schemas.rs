@@ -1,4 +1,4 @@
-//! Databases of older versions, read as if they were of the latest.
+//! Reads databases of older versions as if they had the latest one.
 
 use rusqlite::Connection;
 
@@ -25,10 +25,10 @@ const LABELS: i64 = 10;
 /// The first version with summaries.
 const SUMMARIES: i64 = 11;
 
-/// Lets a database of an older version be read as if it were of the latest, without
-/// changing it. Seals that it does not have are empty.
+/// Makes a database of an older version readable as if it had the latest one, without changing
+/// it. Missing seals are empty.
 pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result<()> {
-    // In the temporary schema, where names are looked up first.
+    // In the temporary schema, in which SQLite looks names up first.
     let if_before = |first, columns: &str| match version < first {
         true => columns.to_owned(),
         false => String::new(),

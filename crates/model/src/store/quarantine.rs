@@ -1,20 +1,20 @@
-//! Workers that were proved faulty.
+//! The table of workers in quarantine.
 
 use rusqlite::{Connection, params};
 
 use super::{Result, Store};
 
-/// A worker that is given nothing until an operator says otherwise.
+/// A worker that is proved faulty, and gets no items until an operator readmits it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct QuarantinedWorker {
-    /// What it calls itself.
+    /// Its name.
     pub name: String,
     /// Why, for people.
     pub reason: String,
 }
 
 impl Store {
-    /// Adds a worker; one that is there stays as it is.
+    /// Adds a worker; does nothing if it is in quarantine already.
     pub fn quarantine(&mut self, worker: &QuarantinedWorker, now_ms: u64) -> Result<()> {
         self.write(|transaction, _| {
             transaction.execute(
@@ -26,7 +26,7 @@ impl Store {
         })
     }
 
-    /// Lets a worker out, if it is there.
+    /// Lets a worker out of quarantine, if it is there.
     pub fn readmit(&mut self, name: &str) -> Result<()> {
         self.write(|transaction, _| {
             transaction.execute("DELETE FROM quarantine WHERE name = ?1", [name])?;
@@ -45,7 +45,7 @@ impl Store {
     }
 }
 
-/// Copies what can be read of the quarantine to another database; older ones have none.
+/// Copies the readable rows of the quarantine to another database; older databases have none.
 pub fn copy(from: &Connection, to: &Connection) -> Result<()> {
     let Ok(mut statement) = from.prepare("SELECT name, reason, since_ms FROM quarantine") else {
         return Ok(());

@@ -1,4 +1,4 @@
-//! What the store keeps, as plain data.
+//! The records of the store, as plain data.
 
 use std::ops::Deref;
 
@@ -9,23 +9,23 @@ use super::{ForkRecord, Summary};
 use crate::{group::Membership, ids::ExperimentId, labels::Labels, priority::Priority};
 use evolution::{Champion, Digest, Statistics};
 
-/// Where an experiment stands.
+/// The state of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExperimentState {
     /// Computing, or waiting for workers.
     Running,
-    /// Given no workers until it is resumed.
+    /// Gets no workers until a client resumes it.
     Paused,
     /// All generations done, or the target fitness reached.
     Completed,
-    /// Given up.
+    /// Ended by an error.
     Failed,
     /// Ended by a client.
     Cancelled,
 }
 
 impl ExperimentState {
-    /// Whether it may still go on.
+    /// Whether it has not ended.
     pub fn is_unfinished(self) -> bool {
         matches!(self, Self::Running | Self::Paused)
     }
@@ -54,27 +54,27 @@ impl ExperimentState {
 pub struct NewExperiment {
     /// The client's key against double submission.
     pub request_id: Option<String>,
-    /// Checked.
+    /// The checked configuration.
     pub config: ExperimentConfig,
     /// Link -1 of the digest chain.
     pub config_digest: Digest,
-    /// Genes of a genotype.
+    /// Number of genes of a genotype.
     pub genotype_len: usize,
-    /// Evolution before its first own generation.
+    /// The state of evolution before its first own generation.
     pub keyframe: Vec<u8>,
-    /// Its share of the fleet.
+    /// Its priority.
     pub priority: Priority,
-    /// The group that it belongs to, if any.
+    /// Its group, if any.
     pub membership: Option<Membership>,
-    /// What people find it by.
+    /// Its labels, by which people find it.
     pub labels: Labels,
-    /// Where it comes from, if it is a fork.
+    /// Its origin, if it is a fork.
     pub fork: Option<ForkRecord>,
     /// The champion of its keyframe, if it has one.
     pub champion: Option<Champion>,
 }
 
-/// An experiment as it stands, with its file.
+/// The present state of an experiment, with its file.
 #[derive(Debug, Clone)]
 pub struct StoredExperiment {
     /// Everything else.
@@ -91,8 +91,8 @@ impl Deref for StoredExperiment {
     }
 }
 
-/// An experiment as it stands, as lists have it: without its file, which is longer than all the
-/// rest.
+/// The present state of an experiment without its file, which is longer than all the rest; for
+/// lists.
 #[derive(Debug, Clone)]
 pub struct ExperimentRecord {
     /// Its id.
@@ -105,57 +105,58 @@ pub struct ExperimentRecord {
     pub config_digest: String,
     /// The simulation that computes it.
     pub fingerprint: String,
-    /// Genes of a genotype.
+    /// Number of genes of a genotype.
     pub genotype_len: u64,
-    /// Where it stands.
+    /// Its state.
     pub state: ExperimentState,
-    /// Why it ended, if not by completing its generations, or why it is paused.
+    /// Why it is paused, or why it ended before its last generation; otherwise empty.
     pub reason: String,
-    /// Milliseconds since 1970 UTC.
+    /// Time of submission, milliseconds since 1970 UTC.
     pub submitted_at_ms: u64,
     /// Latest completed generation.
     pub latest: Option<GenerationRecord>,
-    /// The link that the latest generation ended with, of the re-evaluations'
-    /// digest chain or the generations'; empty before the first.
+    /// The last link after the latest generation, of the re-evaluations' digest chain if the
+    /// generation had a re-evaluation, otherwise of the generations' chain; empty before the
+    /// first.
     pub digest: String,
-    /// Mean fitness of the champion so far on the held-out trials by which it was
-    /// selected; none before the first re-evaluation.
+    /// Mean fitness of the present champion on the held-out trials that selected it; `None`
+    /// before the first re-evaluation.
     pub held_out_fitness: Option<f64>,
-    /// Mean fitness of the champion on trials that selected nothing; none before the end.
+    /// Mean fitness of the champion on trials that selected nothing; `None` before the end.
     pub judged_fitness: Option<f64>,
-    /// Its share of the fleet.
+    /// Its priority.
     pub priority: Priority,
     /// Sequence number of its latest event.
     pub last_sequence: u64,
-    /// The group that it belongs to, if any.
+    /// Its group, if any.
     pub membership: Option<Membership>,
-    /// What people find it by.
+    /// Its labels, by which people find it.
     pub labels: Labels,
     /// Whether lists leave it out.
     pub is_archived: bool,
-    /// Mean wall-clock time of its latest generations, ms; none before the first.
+    /// Mean wall-clock time of its latest generations, ms; `None` before the first.
     pub recent_generation_ms: Option<f64>,
-    /// The first generation in its fitness log; one that is not complete if there is none.
+    /// The first generation in its fitness log; the next generation if the log is empty.
     pub log_from: u64,
-    /// Why that is not generation 0.
+    /// Why `log_from` is not generation 0.
     pub log_gap: LogGap,
-    /// Where it comes from, if it is a fork.
+    /// Its origin, if it is a fork.
     pub fork: Option<ForkRecord>,
 }
 
 impl ExperimentRecord {
-    /// Whether it has ended, and neither log nor keyframe was kept of it.
+    /// Whether it has ended without a log and a keyframe.
     pub fn has_no_log(&self) -> bool {
         let has_gap = matches!(self.log_gap, LogGap::Damaged | LogGap::Older);
         !self.state.is_unfinished() && has_gap && self.log_from >= self.n_generations()
     }
 
-    /// Completed generations, with those that a fork shares with its parent.
+    /// Number of completed generations, including those that a fork shares with its parent.
     pub fn n_generations(&self) -> u64 {
         self.latest.as_ref().map_or(0, |latest| latest.generation + 1)
     }
 
-    /// The link of the generations' digest chain on which the next generation hangs.
+    /// The last link of the generations' digest chain, which the next one covers.
     pub fn last_link(&self) -> &str {
         match (&self.latest, &self.fork) {
             (Some(latest), Some(fork)) if latest.generation == fork.generation => &fork.link,
@@ -164,7 +165,7 @@ impl ExperimentRecord {
         }
     }
 
-    /// Whether more generations can be asked for although it has ended.
+    /// Whether it can be extended after its end.
     pub fn can_be_continued(&self) -> bool {
         self.state == ExperimentState::Completed && self.reason.is_empty()
     }
@@ -173,15 +174,15 @@ impl ExperimentRecord {
 /// Why the fitness log lacks an experiment's first generations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LogGap {
-    /// It does not.
+    /// It lacks none.
     None,
-    /// They were computed by a version that kept no log.
+    /// An older version computed them, which kept no log.
     Older,
-    /// A client had them deleted.
+    /// A client pruned them.
     Pruned,
-    /// They were damaged, and so were not taken into a recovered database.
+    /// They were damaged, so the recovered database omits them.
     Damaged,
-    /// They are the parent's, of which this is a fork.
+    /// They belong to the parent of this fork.
     Forked,
 }
 
@@ -210,34 +211,34 @@ impl LogGap {
 pub struct GenerationRecord {
     /// From 0.
     pub generation: u64,
-    /// Of the individuals' mean fitness.
+    /// Statistics of the individuals' mean fitness.
     pub statistics: Statistics,
     /// Link of the digest chain, hexadecimal.
     pub digest: String,
-    /// Wall-clock time.
+    /// Wall-clock time, ms.
     pub duration_ms: u64,
-    /// Episodes simulated.
+    /// Number of simulated episodes.
     pub episodes: u64,
-    /// Workers at its end.
+    /// Number of connected workers at its end.
     pub workers: u64,
-    /// Share of the fleet's time not spent computing.
+    /// Share of the fleet's time without computation, 0 to 1.
     pub idle_share: f64,
 }
 
-/// Everything that an experiment's results follow from, with its configuration.
+/// Everything from which an experiment's results follow, together with its configuration.
 #[derive(Debug, Clone)]
 pub struct Evidence {
     /// All generations, with the time at which each was completed, ms since 1970 UTC.
     pub history: Vec<(u64, GenerationRecord)>,
     /// The fitness log.
     pub log: Vec<Vec<u8>>,
-    /// States of evolution, by the number of generations before them, in order.
+    /// States of evolution, each with the number of generations before it, in order.
     pub keyframes: Keyframes,
     /// The champion.
     pub champion: Option<Champion>,
 }
 
-/// A generation, and what evolution was told of it.
+/// A generation, and its fitness as bytes of the fitness log.
 pub type LogEntry = (GenerationRecord, Vec<u8>);
 
 /// Something that happened to an experiment.
@@ -247,11 +248,11 @@ pub struct Event {
     pub sequence: u64,
     /// Milliseconds since 1970 UTC.
     pub at_ms: u64,
-    /// What.
+    /// The event.
     pub kind: EventKind,
 }
 
-/// What can happen to an experiment.
+/// An event of an experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EventKind {
     /// A generation was completed.
@@ -260,9 +261,9 @@ pub enum EventKind {
     State {
         /// The new state.
         state: ExperimentState,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// Something worth a line in a log.
+    /// A notice for people.
     Notice(String),
 }

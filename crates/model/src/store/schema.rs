@@ -1,11 +1,11 @@
-//! The database's schema, and the way from older versions to it.
+//! The database's schema, and the migrations from older versions.
 
 use rusqlite::{Connection, TransactionBehavior};
 
 use super::{StoreError, seals};
 
-/// Makes the column `summary` of the column `config`: a list of what
-/// [`Summary`](super::Summary) has. `->` keeps all digits of a seed. It is part of a migration, so
+/// Makes the column `summary` from the column `config`: a list of the fields of
+/// [`Summary`](super::Summary). `->` keeps all digits of a seed. This is part of a migration, so
 /// it never changes.
 macro_rules! summary {
     () => {
@@ -93,7 +93,7 @@ pub(super) const MIGRATIONS: &[&str] = &[
         PRIMARY KEY (experiment_id, sequence)
     ) STRICT, WITHOUT ROWID;
 ",
-    // SQLite cannot change a CHECK, so the table is made anew.
+    // SQLite cannot change a CHECK, so the migration creates the table again.
     "
     CREATE TABLE experiments_with_priority (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -254,8 +254,8 @@ pub(super) const MIGRATIONS: &[&str] = &[
     ALTER TABLE experiments ADD COLUMN archived INTEGER NOT NULL DEFAULT 0
           CHECK (archived IN (0, 1));
 ",
-    // Lists of many experiments leave out their files: these come last in their rows, as SQLite
-    // reads a row up to the column that it needs.
+    // Lists of many experiments omit the files. These come last in their rows, because SQLite
+    // reads a row only up to the last column that it needs.
     concat!(
         "
     CREATE TABLE listed_experiments (
@@ -312,7 +312,7 @@ pub const SEALED: i64 = 3;
 /// The version that this code writes.
 pub const VERSION: i64 = MIGRATIONS.len() as i64;
 
-/// The version of a database; 0 if it is empty, or not one of ours.
+/// The version of a database; 0 if it is empty, or belongs to another program.
 pub fn version(connection: &Connection) -> rusqlite::Result<i64> {
     connection.query_row("PRAGMA user_version", [], |row| row.get(0))
 }
@@ -320,15 +320,15 @@ pub fn version(connection: &Connection) -> rusqlite::Result<i64> {
 /// Brings a database to [`VERSION`].
 pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
     let found = usize::try_from(version(connection)?).unwrap_or(usize::MAX);
-    // A table that others refer to can be replaced only while nobody checks; the
-    // pragma means nothing within a transaction.
+    // A referenced table can be replaced only while SQLite does not check foreign keys; the
+    // pragma has no effect within a transaction.
     connection.pragma_update(None, "foreign_keys", false)?;
     if found < MIGRATIONS.len() {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         for statements in &MIGRATIONS[found..] {
             transaction.execute_batch(statements).map_err(of_other_tables)?;
         }
-        // What seals cover is read from the latest tables.
+        // Sealing reads the latest tables.
         if (found as i64) < SEALED {
             seals::seal_all(&transaction)?;
         }
@@ -347,7 +347,7 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// What a database of the latest version, or read as if it were, lacks of its tables.
+/// The first missing table or column of a database that should have the latest version.
 pub fn missing(connection: &Connection) -> Option<String> {
     let tables =
         ["experiments", "generations", "events", "champions", "fitness_log", "keyframes", "forks"];
@@ -361,7 +361,7 @@ pub fn missing(connection: &Connection) -> Option<String> {
     })
 }
 
-/// Why a database cannot be migrated: what is a bug elsewhere is another schema here.
+/// Why a database cannot be migrated. An error that is a bug elsewhere means another schema here.
 fn of_other_tables(error: rusqlite::Error) -> StoreError {
     let error = match StoreError::from(error) {
         StoreError::Bug(error) => error.to_string(),

@@ -1,10 +1,9 @@
-//! Seals: keyed digests of what runs depend on, so that a row that was changed by
-//! accident or by hand is found, and so is one that was moved to another place.
+//! Seals: keyed digests of the data on which runs depend. They reveal rows that were changed by
+//! accident or by hand, or moved to another place.
 //!
-//! A seal is a keyed BLAKE3 hash of a row's content and its place, under a random key that is
-//! in the database itself, so that a copy can be checked without anything beside it.
-//! Whoever reads the key can make seals: they do not protect against an attacker who
-//! may write the database.
+//! A seal is a keyed BLAKE3 hash of a row's content and its place. The random key is in the
+//! database itself, so that a copy can be checked alone. Programs that can read the key can make
+//! seals, so seals do not protect against an attacker who can write to the database.
 
 use blake3::Hasher;
 use rusqlite::{Connection, Transaction, params};
@@ -27,7 +26,7 @@ impl Sealer {
         })
     }
 
-    /// Of an experiment's configuration and what identifies its bits.
+    /// The seal of an experiment's configuration and of the values that identify its bits.
     pub fn experiment(
         &self,
         id: ExperimentId,
@@ -44,14 +43,14 @@ impl Sealer {
             .finish()
     }
 
-    /// Of a keyframe, which follows the `latest` generation.
+    /// The seal of a keyframe, which follows the `latest` generation.
     pub fn keyframe(
         &self,
         id: ExperimentId,
         latest: Option<&GenerationRecord>,
         state: &[u8],
     ) -> Seal {
-        // The names are those that older versions gave these rows.
+        // Older versions used these names for the rows.
         self.begin("checkpoint", id)
             .number(latest.map_or(0, |latest| latest.generation + 1))
             .text(latest.map_or("", |latest| latest.digest.as_str()).as_bytes())
@@ -59,12 +58,12 @@ impl Sealer {
             .finish()
     }
 
-    /// Of what evolution was told of a generation.
+    /// The seal of a generation's fitness.
     pub fn told(&self, id: ExperimentId, of: &GenerationRecord, told: &[u8]) -> Seal {
         self.begin("step", id).number(of.generation).text(of.digest.as_bytes()).text(told).finish()
     }
 
-    /// Of a row of the history.
+    /// The seal of a row of the history.
     pub fn generation(&self, id: ExperimentId, generation: &GenerationRecord) -> Seal {
         let statistics = &generation.statistics;
         self.begin("generation", id)
@@ -87,7 +86,7 @@ impl Sealer {
     }
 }
 
-/// A seal of a row that is not complete yet.
+/// An incomplete seal of a row.
 pub struct Unfinished(Hasher);
 
 impl Unfinished {
@@ -104,7 +103,7 @@ impl Unfinished {
         self
     }
 
-    /// Adds a number. SQLite does not keep the sign of zero.
+    /// Adds a number, without the sign of zero, which SQLite does not keep.
     pub fn real(self, number: f64) -> Self {
         self.number((number + 0.0).to_bits())
     }
@@ -115,7 +114,7 @@ impl Unfinished {
     }
 }
 
-/// Seals an experiment as it is stored.
+/// Seals a stored experiment.
 pub fn seal_experiment(
     transaction: &Transaction<'_>,
     sealer: &Sealer,
@@ -144,7 +143,7 @@ pub fn experiment_seal(
     })
 }
 
-/// Seals everything in a database that has no seals yet, as it is.
+/// Seals all rows of a database that has no seals yet.
 pub fn seal_all(transaction: &Transaction<'_>) -> Result<()> {
     let sealer = Sealer::from_database(transaction)?;
     let mut statement = transaction.prepare("SELECT id FROM experiments")?;

@@ -1,4 +1,4 @@
-//! What a run continues from, and whether it is what was stored.
+//! Reads the state from which a run continues, and checks its seals.
 
 use evolution::Checkpoint;
 use rusqlite::{Connection, params};
@@ -11,16 +11,16 @@ use super::{
 use crate::ids::ExperimentId;
 
 impl Store {
-    /// An experiment and its checkpoint, both as they were stored;
-    /// [`StoreError::Unsound`] if one of them is not, [`StoreError::NoCheckpoint`] if it has ended
-    /// and kept none.
+    /// An experiment and its checkpoint, both with intact seals. Fails with
+    /// [`StoreError::Unsound`] if a seal is broken, and with [`StoreError::NoCheckpoint`] if the
+    /// experiment has ended without a checkpoint.
     pub fn resumable(&self, id: ExperimentId) -> Result<(StoredExperiment, Checkpoint)> {
         self.read(|connection| {
             let what = match resumable(connection, &self.sealer, id)? {
                 Ok(found) => return Ok(found),
                 Err(what) => what,
             };
-            // Where nothing was kept, nothing is damaged.
+            // Missing data is not damage if none was kept.
             match experiments::get(connection, id) {
                 Ok(Some(ended)) if ended.has_no_log() => Err(StoreError::NoCheckpoint(id)),
                 _ => Err(self.unsound(id, what)),
@@ -28,14 +28,13 @@ impl Store {
         })
     }
 
-    /// The error that a run cannot continue from what is stored.
+    /// The error of a run that cannot continue from the stored state.
     pub fn unsound(&self, id: ExperimentId, what: String) -> StoreError {
         StoreError::Unsound { id, what, path: self.path.clone() }
     }
 
-    /// Pauses an experiment from which no run can continue, and says why among its
-    /// events; nothing else of it is changed, so that nothing is lost. Once it is sound
-    /// again, it can be resumed.
+    /// Pauses an experiment from which no run can continue, and adds the reason to its events. It
+    /// changes nothing else, so that nothing is lost. A repaired experiment can be resumed.
     pub fn set_aside(&mut self, id: ExperimentId, now_ms: u64, reason: &str) -> Result<()> {
         let paused = ExperimentState::Paused;
         self.write(|transaction, _| {
@@ -53,8 +52,8 @@ impl Store {
     }
 }
 
-/// An experiment and its checkpoint, or what of them is not what was stored: the verdict of a
-/// coordinator that goes on, and of whoever looks at the database.
+/// An experiment and its checkpoint, or the part with a broken seal. Both the coordinator and
+/// inspections use this verdict.
 pub fn resumable(
     connection: &Connection,
     sealer: &Sealer,
@@ -69,7 +68,7 @@ pub fn resumable(
     if seal != expected {
         return Ok(Err("its configuration is not what was stored".to_owned()));
     }
-    // Its seal.
+    // The seal of the row.
     if let Err(StoreError::Corrupt(what)) = forks::get(connection, Some(sealer), id) {
         return Ok(Err(what));
     }

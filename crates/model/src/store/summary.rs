@@ -1,10 +1,10 @@
-//! Some keys of an experiment file, which the database keeps beside it, so that a list of ten
-//! thousand experiments parses none of their files.
+//! Some keys of an experiment file. The database stores them beside the file, so that a list of
+//! ten thousand experiments parses no files.
 
 use experiment_file::ExperimentConfig;
 use serde::Deserialize;
 
-/// Keys of an experiment file. Those that a file of an earlier version lacks are 0 or empty.
+/// Keys of an experiment file. Keys that an older file lacks are 0 or empty.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(from = "Row")]
 pub struct Summary {
@@ -54,12 +54,12 @@ impl From<Row> for Summary {
 }
 
 impl Summary {
-    /// Of the column `summary`; of a file that is no JSON there is none.
+    /// Reads the column `summary`, which is NULL if the file is not JSON.
     pub fn from_column(json: Option<&str>) -> Self {
         json.and_then(|json| serde_json::from_str(json).ok()).unwrap_or_default()
     }
 
-    /// Of a file. `config_json`: the same in canonical form.
+    /// The summary of a configuration. `config_json`: its canonical form.
     pub fn from_config(config: &ExperimentConfig, config_json: &str) -> Self {
         let algorithm = &config.algorithm;
         Self {

@@ -1,4 +1,4 @@
-//! What the store promises.
+//! The promises of the store.
 
 use std::fs;
 
@@ -124,7 +124,7 @@ fn a_champion_keeps_its_origin_and_its_fitness_of_both_kinds_apart() {
     };
     let [mean, low, high] = [0.1, 0.1 / 3.0, 0.7].map(real);
     let judged = Judged { mean, low, high, n_trials: 200, generation: 5 };
-    // The end of a run, and then more generations of it, by which the champion is another.
+    // The end of a run, and then more generations, which change the champion.
     for (number, judged) in [(4, None), (5, Some(judged)), (6, None)] {
         let champion = Champion { judged, ..champion.clone() };
         store
@@ -301,7 +301,7 @@ fn a_deleted_experiment_leaves_nothing_but_its_number() {
     assert!(tables.len() >= 6, "{tables:?}");
     assert!(tables.iter().all(|table| n_rows(table) == 0), "{tables:?}");
 
-    // What comes too late does no harm.
+    // Late calls do no harm.
     store.notice(id, 7, "late").unwrap();
     assert!(matches!(commit(&mut store, id, 1, None), Err(StoreError::Ended(_))));
     let (again, is_new) = store.create(&new_experiment(Some("key")), 8).unwrap();

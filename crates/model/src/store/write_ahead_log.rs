@@ -1,10 +1,11 @@
-//! Makes the main file of a database in use tell that it lacks its write-ahead log.
+//! Marks the main file of a database in use, so that a copy without its write-ahead log can be
+//! recognised.
 //!
-//! SQLite appends commits to a log beside the main file, and moves them there from time
-//! to time. The main file alone is a sound database of an earlier moment, and a copy of
-//! it passes for the whole. So here, what the main file says of itself is that it needs
-//! its log, and the log says that it does not: the two together, moved into one file by
-//! whatever program, are complete, and the main file without the log is found out.
+//! SQLite appends commits to a log beside the main file, and moves them there from time to time.
+//! The main file alone is a sound database of an earlier moment, and a copy of it passes for the
+//! whole. So the main file contains a flag that it needs its log, and the log clears this flag.
+//! Both together are complete, also after any program has merged them. The main file without the
+//! log still has the flag.
 
 use std::{
     fs,
@@ -13,22 +14,22 @@ use std::{
 
 use rusqlite::Connection;
 
-/// Pages in the log at which it is moved into the main file, as many as by SQLite's default.
+/// Number of pages in the log at which it is moved into the main file; SQLite's default.
 const N_PAGES_MAX: u32 = 1000;
 
-/// Takes over the moving of the log from SQLite.
+/// Makes this program move the log, instead of SQLite.
 pub fn configure(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "wal_autocheckpoint", 0)
 }
 
-/// The log of a database.
+/// The path of a database's log.
 pub fn path(database: &Path) -> PathBuf {
     let mut path = database.as_os_str().to_owned();
     path.push("-wal");
     path.into()
 }
 
-/// Whether a database has a log that says anything.
+/// Whether a database has a log that is not empty.
 pub fn exists(database: &Path) -> bool {
     fs::metadata(path(database)).is_ok_and(|metadata| metadata.len() > 0)
 }
@@ -40,7 +41,7 @@ pub fn fold_if_long(connection: &Connection) -> rusqlite::Result<()> {
     if n_pages < N_PAGES_MAX { Ok(()) } else { fold(connection) }
 }
 
-/// Whether the database says that it lacks its log.
+/// Whether the database has the flag that its log is missing.
 pub fn is_missed(connection: &Connection) -> rusqlite::Result<bool> {
     connection.query_row("SELECT needs_log FROM identity", [], |row| row.get(0))
 }
@@ -48,13 +49,13 @@ pub fn is_missed(connection: &Connection) -> rusqlite::Result<bool> {
 /// Moves as much of the log into the main file as readers allow.
 pub fn fold(connection: &Connection) -> rusqlite::Result<()> {
     set_missed(connection, true)?;
-    // Never waits: what a reader still needs stays in the log.
+    // Never waits: pages that a reader still needs stay in the log.
     let folded = connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()));
     set_missed(connection, false)?;
     folded
 }
 
-/// What the database says from now on.
+/// Sets or clears the flag.
 pub fn set_missed(connection: &Connection, is_missed: bool) -> rusqlite::Result<()> {
     connection.execute("UPDATE identity SET needs_log = ?1", [is_missed])?;
     Ok(())

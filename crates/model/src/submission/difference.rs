@@ -1,4 +1,4 @@
-//! What is different between two experiment files.
+//! Compares two experiment files.
 
 use serde_json::Value;
 
@@ -7,7 +7,7 @@ const LINES_MAX: usize = 50;
 /// Most characters of a value.
 const VALUE_LEN_MAX: usize = 60;
 
-/// One line per value that differs, `PATH: BEFORE -> AFTER`; of two files in canonical form.
+/// The differences of two files in canonical form, one line per value: `PATH: BEFORE -> AFTER`.
 pub fn difference(before: &str, after: &str) -> Vec<String> {
     let read = |text| serde_json::from_str(text).unwrap_or(Value::Null);
     let mut lines = Vec::new();

@@ -1,4 +1,4 @@
-//! Copies of a database, in use or not, that are whole.
+//! Makes complete copies of a database, in use or not.
 
 use std::{
     fs, io,
@@ -12,18 +12,18 @@ use super::{
     Inspection, inspect_file,
 };
 
-/// What became of a backup.
+/// The outcome of a backup.
 #[derive(Debug)]
 pub enum Backup {
-    /// The copy is where it was wanted. Experiments that are damaged are in it as they are, and
-    /// are findings; everything else is sound.
+    /// The copy is complete. It contains damaged experiments unchanged, and reports them as
+    /// findings; everything else is sound.
     Made(Inspection),
-    /// The database as a whole is damaged, so that there is no copy.
+    /// The database as a whole is damaged, so there is no copy.
     Damaged(Inspection),
 }
 
-/// Makes the data directory `to` a copy of another one, whether or not a coordinator
-/// uses that; of one moment, and looked through.
+/// Copies a data directory to `to`, whether or not a coordinator uses it. The copy has the state
+/// of one moment, and is inspected.
 pub fn backup(directory: &Path, to: &Path) -> Result<Backup> {
     let from = file::path_in(directory);
     file::must_exist(&from)?;
@@ -41,7 +41,7 @@ pub fn backup(directory: &Path, to: &Path) -> Result<Backup> {
             return Err(error);
         }
     };
-    // A damaged experiment takes no other one's backup.
+    // A damaged experiment does not prevent the backup of others.
     if inspection.findings.iter().any(|finding| finding.experiment.is_none()) {
         abandon(to);
         return Ok(Backup::Damaged(Inspection { path: from, ..inspection }));
@@ -58,28 +58,26 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     if is_sealed && !has_log && write_ahead_log::is_missed(&source)? {
         return Err(StoreError::WithoutLog { path: from.to_owned() });
     }
-    // One read transaction: what a coordinator commits meanwhile is not in it. Unused pages
-    // are left out.
+    // One read transaction, so later commits are not in the copy. Unused pages are omitted.
     let to_name = to.to_str().ok_or_else(|| StoreError::Target {
         path: to.to_owned(),
         source: io::Error::other("its name is not UTF-8"),
     })?;
     source.execute("VACUUM INTO ?1", [to_name])?;
     if is_sealed {
-        // The log of the original may just have been moved.
+        // The original may just have moved its log into the main file.
         write_ahead_log::set_missed(&Connection::open(to)?, false)?;
     }
     Ok(())
 }
 
-/// Makes the directory of a new database; returns what the database is called until it
-/// is complete.
+/// Creates the directory of a new database; returns the database's path until it is complete.
 pub fn prepare(to: &Path) -> Result<PathBuf> {
     let failed = |source: io::Error| StoreError::Target { path: to.to_owned(), source };
     fs::create_dir_all(to).map_err(failed)?;
     let unfinished = file::unfinished_in(to);
     for entry in fs::read_dir(to).map_err(failed)? {
-        // Left by an attempt that was interrupted.
+        // An interrupted attempt left this file.
         if entry.map_err(failed)?.path() != unfinished {
             return Err(StoreError::NotEmpty { path: to.to_owned() });
         }
@@ -88,9 +86,9 @@ pub fn prepare(to: &Path) -> Result<PathBuf> {
     Ok(unfinished)
 }
 
-/// Removes what [`prepare`] made, and what was written there.
+/// Removes the directory of [`prepare`], and its files.
 pub fn abandon(to: &Path) {
-    // What cannot be removed is not taken for a database.
+    // Remaining files are not mistaken for a database.
     let _ = fs::remove_file(file::unfinished_in(to));
     let _ = fs::remove_dir(to);
 }

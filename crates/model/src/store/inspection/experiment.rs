@@ -1,4 +1,4 @@
-//! An experiment, read part by part: what of it can be read and is as it was stored.
+//! Reads an experiment part by part, and finds the readable parts with intact seals.
 
 use evolution::{ALGORITHMS, Champion, Digest};
 use experiment_file::ExperimentConfig;
@@ -16,24 +16,24 @@ use super::{
 };
 use crate::{ids::ExperimentId, restored::restore_evolution};
 
-/// What there is of an experiment. A part that is none is damaged.
+/// The sound parts of an experiment. A part that is `None` is damaged.
 #[derive(Debug)]
 pub struct Inspected {
     /// Its id.
     pub id: ExperimentId,
-    /// Its configuration and the rest of its row.
+    /// Its row, with the configuration.
     pub row: Option<ExperimentRow>,
     /// All its generations.
     pub history: Option<Vec<GenerationRecord>>,
     /// Its champion, if it has one.
     pub champion: Option<Option<Champion>>,
-    /// What of its fitness log can be kept. None is no damage if it has ended and has none.
+    /// The sound part of its fitness log. `None` is not damage if it has ended without a log.
     pub log: Option<SoundLog>,
-    /// Whether it can go on from its log.
+    /// Whether it can continue from its log.
     pub can_go_on: bool,
     /// All its events.
     pub events: Option<Vec<EventRow>>,
-    /// What is wrong, one line each.
+    /// The problems, one line each.
     pub problems: Vec<String>,
 }
 
@@ -46,7 +46,7 @@ pub struct ExperimentRow {
     pub config_digest: String,
     pub fingerprint: String,
     pub genotype_len: u64,
-    /// None if there is no such state.
+    /// `None` if the state is unknown.
     pub state: Option<ExperimentState>,
     pub reason: String,
     pub submitted_at_ms: u64,
@@ -57,14 +57,14 @@ pub struct ExperimentRow {
     pub labels: String,
     pub is_archived: bool,
     pub log_from: u64,
-    /// None if there is no such reason.
+    /// `None` if the reason is unknown.
     pub log_gap: Option<LogGap>,
-    /// Where it comes from, if it is a fork.
+    /// Its origin, if it is a fork.
     pub fork: Option<ForkRecord>,
 }
 
 impl ExperimentRow {
-    /// The link of the digest chain on which a generation hangs that follows `history`.
+    /// The last link of the digest chain after `history`.
     pub fn last_link<'a>(&'a self, history: &'a [GenerationRecord]) -> &'a str {
         match (history.last(), &self.fork) {
             (Some(latest), Some(fork)) if latest.generation == fork.generation => &fork.link,
@@ -73,7 +73,7 @@ impl ExperimentRow {
         }
     }
 
-    /// Whether it may still go on.
+    /// Whether it has not ended.
     pub fn is_unfinished(&self) -> bool {
         self.state.is_some_and(ExperimentState::is_unfinished)
     }
@@ -90,19 +90,19 @@ pub struct EventRow {
     pub message: Option<String>,
 }
 
-/// What can be kept of an experiment.
+/// The result of a recovery for an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
-    /// All that its bits and its results depend on.
+    /// Everything on which its bits and its results depend is kept.
     Kept,
-    /// Its configuration: it can be computed again, to the same bits.
+    /// Only its configuration is kept: it can be recomputed, to the same bits.
     Restarted,
-    /// Nothing.
+    /// Nothing is kept.
     Lost,
 }
 
 impl Fate {
-    /// What to do about damage. `restore`: what always helps.
+    /// The next step after damage. `restore`: the step that always helps.
     pub fn next_step(self, restore: &str) -> String {
         let outcome = match self {
             Self::Kept => "that keeps the rest of the experiment",
@@ -126,14 +126,15 @@ impl Inspected {
         let mut can_go_on = false;
         if let (Some(row), Some(history)) = (&row, &history) {
             log = log::read(connection, sealer, id, history, row, &mut problems);
-            // Another version of the simulation may have other algorithms.
+            // Another version of the simulation may know other algorithms.
             can_go_on = log.is_some()
                 && (row.fingerprint != sim_core::FINGERPRINT
                     || keep(&mut problems, log::check_end(connection, sealer, id, history, row))
                         .is_some());
         }
         let events = keep(&mut problems, read_events(connection, id, history.as_deref()));
-        // The coordinator's own verdict. Of what ended, it goes on only if it is asked to.
+        // The verdict of the coordinator itself, which continues an ended experiment only on
+        // request.
         let is_unfinished = row.as_ref().is_some_and(ExperimentRow::is_unfinished);
         if let (true, true, Some(sealer)) = (is_unfinished, can_go_on, sealer) {
             can_go_on = keep(&mut problems, check_resumable(connection, sealer, id)).is_some();
@@ -143,18 +144,18 @@ impl Inspected {
         inspected
     }
 
-    /// What can be kept of it.
+    /// The result of a recovery for it.
     pub fn fate(&self) -> Fate {
         let Some(row) = &self.row else { return Fate::Lost };
         let has_all = match row.state {
             None => false,
-            // The next generation brings the champion again.
+            // The next generation restores the champion.
             Some(state) if state.is_unfinished() => self.can_go_on,
             Some(_) => self.history.is_some() && self.champion.is_some(),
         };
         match has_all {
             true => Fate::Kept,
-            // A fork begins with the state of another experiment.
+            // A fork needs the state of another experiment.
             false if row.fingerprint == sim_core::FINGERPRINT && row.fork.is_none() => {
                 Fate::Restarted
             }
@@ -178,7 +179,7 @@ impl Inspected {
     }
 }
 
-/// What a coordinator that starts looks at before an experiment goes on.
+/// The checks of a coordinator before an experiment continues.
 fn check_resumable(
     connection: &Connection,
     sealer: &Sealer,
@@ -186,19 +187,19 @@ fn check_resumable(
 ) -> Result<(), String> {
     let resumable = soundness::resumable(connection, sealer, id);
     let (experiment, checkpoint) = resumable.map_err(|error| error.to_string())??;
-    // Another version of the simulation lets it wait.
+    // With another version of the simulation, the experiment only waits.
     if experiment.fingerprint == sim_core::FINGERPRINT {
         restore_evolution(&experiment, &checkpoint)?;
     }
     Ok(())
 }
 
-/// A part, or none and what is wrong with it.
+/// Returns a part, or adds its problem and returns `None`.
 fn keep<T>(problems: &mut Vec<String>, part: Result<T, String>) -> Option<T> {
     part.map_err(|problem| problems.push(problem)).ok()
 }
 
-/// What is wrong with a part that cannot be read.
+/// The problem of an unreadable part.
 pub fn unreadable(what: &str) -> impl Fn(rusqlite::Error) -> String {
     move |error| format!("{what} cannot be read: {error}")
 }
@@ -245,7 +246,7 @@ fn read_row(
             return Err("its configuration is not what was stored".to_owned());
         }
     }
-    // Another version of the simulation may have other files.
+    // Another version of the simulation may accept other files.
     if row.fingerprint == sim_core::FINGERPRINT {
         let (config, _) = ExperimentConfig::from_json(&row.config, "", ALGORITHMS)
             .map_err(|error| format!("its configuration is not valid: {error}"))?;
@@ -290,7 +291,7 @@ fn read_champion(
     })
 }
 
-/// Events have no seals, as no result depends on them.
+/// Events have no seals, because no result depends on them.
 fn read_events(
     connection: &Connection,
     id: ExperimentId,

@@ -1,5 +1,4 @@
-//! The fitness log of an experiment in a database that may be damaged: from where on it is
-//! sound.
+//! Finds the sound end of a fitness log in a database that may be damaged.
 
 use evolution::Evolution;
 use rusqlite::{Connection, Row, params};
@@ -10,17 +9,17 @@ use super::{
 };
 use crate::ids::ExperimentId;
 
-/// What of a fitness log can be kept: everything from a keyframe on.
+/// The sound end of a fitness log, from a keyframe on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SoundLog {
-    /// Generations before that keyframe.
+    /// Number of generations before that keyframe.
     pub first: u64,
-    /// Why that is not 0.
+    /// Why this number is not 0.
     pub gap: LogGap,
 }
 
-/// Finds the longest sound end of a log; none if there is none, not even a keyframe after
-/// the latest generation. Adds what is wrong to `problems`.
+/// Finds the longest sound end of a log; `None` if not even a keyframe after the latest
+/// generation is sound. Adds the damage to `problems`.
 pub fn read(
     connection: &Connection,
     sealer: Option<&Sealer>,
@@ -52,7 +51,7 @@ pub fn read(
     }
 }
 
-/// The first keyframe from which all of the log is sound.
+/// Finds the first keyframe from which the rest of the log is sound.
 fn find(
     connection: &Connection,
     sealer: Option<&Sealer>,
@@ -86,7 +85,7 @@ fn find(
         let is_sound = latest != Some(None)
             && sealer.is_none_or(|sealer| seal == sealer.keyframe(id, latest.flatten(), state));
         if !is_sound && n_generations >= sound_from {
-            // What follows from it is read from the keyframe before.
+            // Later generations follow from the previous keyframe.
             first = None;
         } else if first.is_none() && n_generations >= sound_from {
             first = Some(n_generations);
@@ -120,7 +119,7 @@ fn bytes_of<'a>(row: &'a Row<'_>, column: usize) -> rusqlite::Result<&'a [u8]> {
     Ok(row.get_ref(column)?.as_bytes()?)
 }
 
-/// Whether the latest checkpoint leads to where the history ends; or why not.
+/// Checks that the latest checkpoint leads to the end of the history.
 pub fn check_end(
     connection: &Connection,
     sealer: Option<&Sealer>,

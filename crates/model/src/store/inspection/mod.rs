@@ -1,5 +1,5 @@
-//! Looks at a database that may be damaged, and makes new data directories of what is
-//! sound in it. Never writes to it.
+//! Inspects a database that may be damaged, and recovers its sound parts into new data
+//! directories. Never writes to the database.
 
 mod backup;
 mod experiment;
@@ -20,34 +20,33 @@ pub use recovery::{Recovered, Recovery, recover};
 use experiment::Inspected;
 use source::Source;
 
-/// What a database is like.
+/// The result of an inspection.
 #[derive(Debug)]
 pub struct Inspection {
     /// The database.
     pub path: PathBuf,
     /// Version of its schema.
     pub schema_version: i64,
-    /// Experiments in it.
+    /// Number of experiments.
     pub n_experiments: usize,
-    /// Generations that can be read and are as they were stored.
+    /// Number of readable generations with intact seals.
     pub n_generations: usize,
-    /// What is wrong.
+    /// The problems.
     pub findings: Vec<Finding>,
 }
 
-/// Something that is wrong with a database.
+/// A problem of a database.
 #[derive(Debug)]
 pub struct Finding {
-    /// The experiment that it is about, if it is about one.
+    /// The experiment, if the problem concerns one.
     pub experiment: Option<ExperimentId>,
-    /// What is wrong, in one line.
+    /// The problem, in one line.
     pub what: String,
-    /// What can be done, in one line.
+    /// The next step, in one line.
     pub next_step: String,
 }
 
-/// Looks at everything in the database of a data directory, whether or not a
-/// coordinator uses it.
+/// Inspects the whole database of a data directory, whether or not a coordinator uses it.
 pub fn inspect(directory: &Path) -> Result<Inspection> {
     let path = super::file::path_in(directory);
     let restore = format!(
@@ -58,7 +57,7 @@ pub fn inspect(directory: &Path) -> Result<Inspection> {
     inspect_file(&path, &restore)
 }
 
-/// Looks at a database. `restore`: what to do about damage that is not an experiment's.
+/// Inspects a database. `restore`: the next step for damage that does not concern an experiment.
 fn inspect_file(path: &Path, restore: &str) -> Result<Inspection> {
     let mut findings = Vec::new();
     let general = |what: String| Finding { experiment: None, what, next_step: restore.to_owned() };

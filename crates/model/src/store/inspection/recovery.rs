@@ -1,4 +1,4 @@
-//! A new data directory with everything that is sound in a damaged one.
+//! Makes a new data directory from the sound parts of a damaged one.
 
 use std::path::Path;
 
@@ -17,31 +17,31 @@ use super::{
 };
 use crate::{ids::ExperimentId, submission::Submission};
 
-/// Why an experiment is paused that begins again.
+/// The reason of the pause of a restarted experiment.
 const BEGINS_AGAIN: &str = "recovered from a damaged database without its generations: resume it to \
                             have them computed again, to the same bits";
 
-/// What became of the experiments of a damaged database.
+/// The outcome of a recovery.
 #[derive(Debug)]
 pub struct Recovery {
     /// All experiments, in order.
     pub experiments: Vec<Recovered>,
-    /// What is wrong with the database as a whole.
+    /// The damage of the database as a whole.
     pub damage: Vec<String>,
 }
 
-/// What became of an experiment.
+/// The outcome for one experiment.
 #[derive(Debug)]
 pub struct Recovered {
     /// The experiment.
     pub id: ExperimentId,
-    /// What is in the new directory.
+    /// The parts in the new directory.
     pub fate: Fate,
-    /// What is not, one line each.
+    /// The damage, one line each.
     pub problems: Vec<String>,
 }
 
-/// Makes the data directory `to` of everything that is sound in another one.
+/// Makes the data directory `to` from the sound parts of another one.
 pub fn recover(directory: &Path, to: &Path) -> Result<Recovery> {
     let source = Source::open(&file::path_in(directory))?;
     let unfinished = prepare(to)?;
@@ -76,7 +76,7 @@ fn write_all(source: &Source, path: &Path) -> Result<Vec<Recovered>> {
         let fate =
             write(&source.connection, &transaction, &sealer, &inspected).or_else(|error| {
                 match error {
-                    // What was read contradicts itself.
+                    // The parts contradict each other.
                     StoreError::Bug(error) => {
                         transaction.execute_batch("ROLLBACK TO experiment")?;
                         inspected.problems.push(format!("it cannot be written: {error}"));
@@ -89,7 +89,7 @@ fn write_all(source: &Source, path: &Path) -> Result<Vec<Recovered>> {
         experiments.push(Recovered { id, fate, problems: inspected.problems });
     }
     quarantine::copy(&source.connection, &transaction)?;
-    // Ids are not used again, those of lost experiments neither.
+    // Ids are never used again, not even those of lost experiments.
     if let Some(Recovered { id, .. }) = experiments.last() {
         transaction.execute("DELETE FROM sqlite_sequence WHERE name = 'experiments'", [])?;
         let sql = "INSERT INTO sqlite_sequence VALUES ('experiments', ?1)";
@@ -100,7 +100,7 @@ fn write_all(source: &Source, path: &Path) -> Result<Vec<Recovered>> {
     Ok(experiments)
 }
 
-/// Writes what can be kept of an experiment.
+/// Writes the sound parts of an experiment.
 fn write(
     source: &Connection,
     transaction: &Transaction<'_>,

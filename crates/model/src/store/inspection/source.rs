@@ -1,4 +1,4 @@
-//! A database that may be damaged, opened to be read.
+//! A database that may be damaged, opened for reading.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -9,9 +9,9 @@ use super::super::{
 };
 use crate::ids::ExperimentId;
 
-/// Most lines of SQLite's own check that are reported.
+/// Most lines of SQLite's own check to report.
 const DAMAGE_MAX: u32 = 20;
-/// Most ids that are tried one by one: damage can pass for any number.
+/// Most ids to try one by one, because damage can look like any number.
 const IDS_MAX: u64 = 1 << 20;
 
 /// A database as it was at one moment.
@@ -20,8 +20,7 @@ pub struct Source {
     pub connection: Connection,
     /// Version of its schema.
     pub version: i64,
-    /// None if it has no seals, or has lost their key: then only what can be computed is
-    /// checked.
+    /// `None` if the database has no seals, or has lost their key; then only digests are checked.
     pub sealer: Option<Sealer>,
     /// What is wrong with the database as a whole.
     pub damage: Vec<String>,
@@ -34,9 +33,9 @@ impl Source {
         let has_log = write_ahead_log::exists(path);
         let connection = file::open_read_only(path)?;
         let mut damage = structure(&connection);
-        // Lets everything that is there be read, even if the end of the file is gone.
+        // Allows reading all existing pages, even if the end of the file is missing.
         connection.pragma_update(None, "writable_schema", true)?;
-        // From now on, everything is of one moment.
+        // From now on, all reads see the state of one moment.
         connection.execute_batch("BEGIN")?;
         let version = match schema::version(&connection) {
             Ok(version) if version > schema::VERSION => {
@@ -78,7 +77,7 @@ impl Source {
         Ok(Self { connection, version, sealer, damage })
     }
 
-    /// All experiments, those that cannot be read, too.
+    /// All experiments, including unreadable ones.
     pub fn experiments(&self) -> Vec<ExperimentId> {
         let mut ids = BTreeSet::new();
         for sql in [
@@ -97,14 +96,14 @@ impl Source {
         ids.into_iter().map(ExperimentId).collect()
     }
 
-    /// Whether there is such an experiment, or it is not known.
+    /// Whether the experiment exists, or cannot be excluded.
     fn may_have(&self, id: u64) -> bool {
         let sql = "SELECT count(*) FROM experiments WHERE id = ?1";
         self.connection.query_row(sql, [id], |row| row.get(0)).unwrap_or(true)
     }
 }
 
-/// What SQLite itself finds.
+/// The damage that SQLite itself finds.
 fn structure(connection: &Connection) -> Vec<String> {
     let lines = |sql: &str| {
         let mut statement = connection.prepare(sql)?;

@@ -1,4 +1,4 @@
-//! Databases with damage of every kind, and what is found and kept of them.
+//! Databases with damage of every kind, and the results of inspection and recovery.
 
 use std::fs;
 
@@ -250,12 +250,12 @@ fn what_of_a_damaged_log_is_sound_is_kept() {
         (found.log_from, found.log_gap)
     };
     assert_eq!(log_of(running), (3, LogGap::Damaged));
-    // How long fitness was the same, the lost part of the log would say.
+    // Only the lost part of the log has the number of generations with equal fitness.
     assert_eq!(store.resumable(running).unwrap().1, Checkpoint { n_flat: 0, ..before });
     assert_eq!(log_of(ended), (3, LogGap::Damaged), "its results are not damaged");
 }
 
-/// Whatever page is damaged, everything that the new directory has is as it was.
+/// With any damaged page, all data in the new directory is unchanged.
 #[test]
 fn no_damaged_page_gets_into_a_recovered_directory() {
     let sound = data_directory();

@@ -1,4 +1,4 @@
-//! Damage of every kind, and the verdicts of whoever meets it: all say the same.
+//! Damage of every kind: all programs that meet it agree on the verdict.
 
 use std::{fs, path::Path};
 
@@ -18,7 +18,7 @@ use crate::{
 /// The unfinished experiment with generations.
 const RUNNING: ExperimentId = ExperimentId(2);
 
-/// Whether a coordinator would go on with an experiment.
+/// Whether a coordinator would continue an experiment.
 fn goes_on(store: &Store, id: ExperimentId) -> bool {
     let resumable = store.resumable(id).ok();
     resumable.is_some_and(|(found, checkpoint)| restore_evolution(&found, &checkpoint).is_ok())
@@ -63,7 +63,7 @@ fn doctor_and_coordinator_give_the_same_verdict_of_every_kind_of_damage() {
         let directory = tempfile::tempdir().unwrap();
         fs::copy(file::path_in(original.path()), file::path_in(directory.path())).unwrap();
         let database = Connection::open(file::path_in(directory.path())).unwrap();
-        // What the schema refuses cannot be there.
+        // The schema excludes this value.
         if database.execute_batch(&sql).is_err() {
             continue;
         }
@@ -74,7 +74,8 @@ fn doctor_and_coordinator_give_the_same_verdict_of_every_kind_of_damage() {
         let coordinator = Store::open(directory.path()).map(|store| goes_on(&store, RUNNING));
         let goes_on_here = coordinator.unwrap_or(false);
         assert!(goes_on_here || is_found, "{sql}: only the coordinator says that it is damaged");
-        // What goes on may have damage that no run depends on, such as to its events.
+        // An experiment that continues may have damage on which no run depends, such as to its
+        // events.
         if goes_on_here {
             n_harmless += 1
         } else {
@@ -132,7 +133,7 @@ fn a_champion_whose_interval_older_versions_could_not_compute_is_read() {
     for nan in [f64::NAN, -f64::NAN] {
         let transaction = store.connection().unchecked_transaction().unwrap();
         super::super::champions::put(&transaction, &sealer, id, &champion, None, "").unwrap();
-        // As an older version sealed it, which stored what is not a number as NULL.
+        // Sealed as by an older version, which stored NaN as NULL.
         let seal = sealer
             .begin("champion", id)
             .number(0)
@@ -205,7 +206,7 @@ fn tables_of_another_program_are_refused_in_one_short_line() {
                 let is_short = text.lines().count() == 1 && text.len() < 400;
                 assert!(is_short && !text.contains("report this"), "{version}, {tables}: {text}");
             }
-            // Whoever looks at it comes to an end, too.
+            // The inspection also ends.
             match inspect(directory.path()) {
                 Ok(inspection) => {
                     let is_line = |finding: &Finding| finding.what.lines().count() == 1;
@@ -234,7 +235,7 @@ fn of_a_recovered_experiment_that_has_ended_nobody_says_that_it_is_damaged() {
     assert!(store.champion(id).unwrap().is_some());
     let refused = store.resumable(id).unwrap_err();
     assert!(matches!(refused, StoreError::NoCheckpoint(_)), "{refused}");
-    // What was changed afterwards is damage, to both.
+    // Both report a later change as damage.
     edit(&recovered, "UPDATE experiments SET config = '{}' WHERE id = 1");
     assert!(!findings(&recovered).is_empty());
 }

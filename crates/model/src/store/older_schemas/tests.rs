@@ -1,4 +1,4 @@
-//! Databases of every version that there has been.
+//! Databases of every released version.
 
 use std::{fs, path::Path};
 
@@ -12,7 +12,7 @@ use super::super::{
 };
 
 /// Replaces a directory's database by one of an older version, made by that version's own
-/// statements, with the same rows in as many columns as it has.
+/// statements, with the same rows in the columns of that version.
 pub fn downgrade(directory: &Path, version: i64) {
     let path = file::path_in(directory);
     let latest = path.with_extension("latest");
@@ -28,7 +28,7 @@ pub fn downgrade(directory: &Path, version: i64) {
         &older,
         "SELECT name FROM main.sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'",
     ) {
-        // Before there was a log, a row had the latest state, and another table what came after.
+        // Before the log, a row had the latest state, and another table the later steps.
         let source = match table.as_str() {
             "checkpoints" if version < 5 => "SELECT experiment_id, CAST(state AS TEXT) AS state, seal FROM latest.keyframes ORDER BY n_generations",
             "checkpoints" => "SELECT * FROM latest.keyframes ORDER BY n_generations",
@@ -58,7 +58,7 @@ fn names(connection: &Connection, sql: &str) -> Vec<String> {
     statement.query_map([], |row| row.get(0)).unwrap().map(Result::unwrap).collect()
 }
 
-/// Everything that all versions have, of each experiment.
+/// The data of each experiment that all versions have.
 fn contents(store: &Store) -> Vec<String> {
     let experiments = store.experiments(&Filter::default()).unwrap();
     let all = experiments.iter().map(|experiment| {
@@ -117,7 +117,8 @@ fn databases_of_every_version_open_and_keep_what_they_have() {
     }
 }
 
-/// Databases were written by these statements: a change would be a database that nobody has.
+/// These statements made existing databases; after a change they would make databases that no
+/// user has.
 #[test]
 fn released_migrations_stay_as_they_are() {
     let digests = MIGRATIONS

@@ -36,7 +36,7 @@ fn what_was_edited_or_moved_is_found_and_its_neighbour_is_not_blamed() {
         ("DELETE FROM fitness_log WHERE experiment_id = 1", "checkpoint"),
         ("DELETE FROM keyframes WHERE experiment_id = 1", "checkpoint"),
         (
-            // The neighbour's, with its seal.
+            // The row of the other experiment, with its seal.
             "UPDATE keyframes AS k SET (state, seal) =
                     (SELECT state, seal FROM keyframes
                      WHERE experiment_id = 2 AND n_generations = k.n_generations)
@@ -180,9 +180,9 @@ fn a_copy_of_a_database_in_use_is_refused_without_its_log() {
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
     assert_refused();
 
-    // As a killed coordinator leaves it.
+    // The state that a killed coordinator leaves.
     let killed = copy(directory.path(), true);
-    // Whoever looks into it may move the log into the main file.
+    // A program that reads it may move the log into the main file.
     let looked_at = copy(directory.path(), true);
     let looking = Connection::open(file::path_in(looked_at.path())).unwrap();
     looking.query_row("SELECT count(*) FROM experiments", [], |_| Ok(())).unwrap();
