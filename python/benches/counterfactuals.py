@@ -1,7 +1,8 @@
-"""How long all 10,000 counterfactuals of experiment A take: ``python python/benches/counterfactuals.py``.
+"""Measures the time of all 10,000 counterfactuals of experiment A: ``python
+python/benches/counterfactuals.py``.
 
-Every message and everything that is sensed by radio, of ten robots in 20 steps of 50 trials; in one thread, and with
-the robots shared out between two.
+Replaces every message and every radio reading of ten robots in 20 steps of 50 trials; in one thread, and with
+the robots split between two.
 """
 
 import json

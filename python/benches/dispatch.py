@@ -1,9 +1,9 @@
-"""What it costs to drive a fleet from Python: ``python python/benches/dispatch.py PROGRAMS``.
+"""Measures the cost of driving a fleet from Python: ``python python/benches/dispatch.py PROGRAMS``.
 
-Generations of a run of leader selection, 100 individuals, and by turns ``Client.evaluate`` of
-as many genotypes in the same trials, on a coordinator and two workers of one slot; with
-episodes of one step and one trial, which take next to nothing, and as the file has them. ``PROGRAMS``:
-the directory of the release programs ``coordinator`` and ``worker``.
+Alternates generations of a run of leader selection, 100 individuals, with ``Client.evaluate`` of as
+many genotypes in the same trials, on a coordinator and two workers of one slot; with episodes of one
+step and one trial, which take almost no time, and with those of the file. ``PROGRAMS``: the directory
+of the release programs ``coordinator`` and ``worker``.
 """
 
 import os

@@ -1,7 +1,7 @@
-"""How fast the package simulates: ``python python/benches/speed.py SWARMCTL``.
+"""Measures the speed of the package's simulation: ``python python/benches/speed.py SWARMCTL``.
 
-Times of a trace as arrays; and of ``evaluate`` by turns with ``swarmctl bench``, so that
-both meet the same load. ``SWARMCTL`` is the release program of the same sources.
+Times a trace as arrays, and alternates ``evaluate`` with ``swarmctl bench``, so that both meet the
+same load. ``SWARMCTL`` is the release program of the same sources.
 """
 
 import json
@@ -37,7 +37,7 @@ def main(swarmctl: str) -> None:
 
 def trace_ms(clock: Callable[[], float], is_seen: bool = True) -> list[float]:
     """Of 50 robots and 1,000 steps; the first, which warms up, does not count. ``is_seen``: with
-    everything that there is to see, not the fitness alone."""
+    all recorded values, not the fitness alone."""
     file = swarmevo.Experiment.from_file(CONFIG).to_dict()
     file["algorithm"]["evaluation_steps"] = 1000
     file["world"]["objects"]["robotA"]["num_instances"] = 50
@@ -66,7 +66,7 @@ def package_us(n_threads: int) -> float:
 
 
 def bench_us(swarmctl: str, n_cores: int) -> float:
-    """The same of the Rust program."""
+    """The same for the Rust program."""
     command = [swarmctl, "bench", str(CONFIG), "--seconds", "1", "--cores", str(n_cores),
                "--output", "json"]
     printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout

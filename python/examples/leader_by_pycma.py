@@ -35,13 +35,13 @@ def main() -> None:
     optimiser = cma.CMAEvolutionStrategy(start, 0.3, options)
     for generation in range(args.generations):
         asked = np.array(optimiser.ask())
-        # Every generation meets worlds of its own, as in the project's runs.
+        # Every generation gets its own worlds, as in the project's runs.
         fitness = evaluate(swarmevo.mirror(asked), generation).mean(axis=1)
         optimiser.tell(asked.tolist(), (-fitness).tolist())
         if (generation + 1) % 10 == 0:
             print(f"{generation + 1}/{args.generations}  best {fitness.max():.3f}  mean {fitness.mean():.3f}")
 
-    # What the mean of the distribution is worth, on trials that selected nothing.
+    # The fitness of the mean of the distribution, on trials that selected nothing.
     found = swarmevo.mirror(optimiser.mean)
     judged = experiment.evaluate(found, swarmevo.TrialSet.judgement(args.generations), trials=200)
     print(f"mean of the distribution: {judged.mean():.3f} on 200 new trials")

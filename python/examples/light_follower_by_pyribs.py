@@ -3,8 +3,8 @@
     pip install './python[all]' ribs
     python python/examples/light_follower_by_pyribs.py --config configs/light_follower_snes.json
 
-Writes a heat map: how good the best controller is of each kind, by how fast its robots drive
-and how sharply they turn.
+Writes a heat map: the fitness of the best controller of each kind, by the speed of its robots and
+the sharpness of their turns.
 """
 
 import argparse
@@ -65,7 +65,7 @@ def main() -> None:
 
 
 def behave(experiment: swarmevo.Experiment, genotype: np.ndarray) -> tuple[float, list[float]]:
-    """Fitness, and what kind of behaviour it is."""
+    """Fitness, and the kind of behaviour."""
     trace = experiment.simulate(genotype, trials=1)
     speed = np.abs(trace.wheels.mean(axis=-1)).mean()
     turn = np.abs(trace.wheels[..., 0] - trace.wheels[..., 1]).mean() / 2

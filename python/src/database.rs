@@ -1,4 +1,4 @@
-//! The database of a data directory: what a coordinator would answer.
+//! The database of a data directory, which answers like a coordinator.
 
 use std::{
     path::Path,
@@ -14,7 +14,7 @@ use crate::{
     running::guarded,
 };
 
-/// A data directory, which is only read. A coordinator may use it meanwhile.
+/// A data directory, opened for reading only. A coordinator may use it meanwhile.
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Database {
     reader: Mutex<BlockingReader>,
@@ -30,7 +30,7 @@ impl Database {
         Ok(Self { reader: Mutex::new(reader), process: process::id() })
     }
 
-    /// A reading call of `ExperimentService`, by its name: request and response as they travel.
+    /// A reading call of `ExperimentService`, by its name, with encoded request and response.
     fn call(&self, py: Python<'_>, name: &str, request: &[u8]) -> PyResult<Vec<u8>> {
         if self.process != process::id() {
             return Err(fork_error(py, "a data directory is opened again after a fork"));

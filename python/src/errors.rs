@@ -6,7 +6,8 @@ use pyo3::{call::PyCallArgs, exceptions::PyValueError, prelude::*};
 use sim_core::EvaluateError;
 use tonic::Status;
 
-/// The exception `name` of `swarmevo.errors` with these arguments; if it cannot be made, why.
+/// The exception `name` of `swarmevo.errors` with these arguments, or the error of creating
+/// it.
 fn exception<'py>(py: Python<'py>, name: &str, args: impl PyCallArgs<'py>) -> PyErr {
     let made = || {
         let class = py.import("swarmevo.errors")?.getattr(name)?;
@@ -23,12 +24,12 @@ pub fn config_error(py: Python<'_>, error: &ConfigError) -> PyErr {
     exception(py, "ExperimentError", (problems.collect::<Vec<_>>(),))
 }
 
-/// A generation of which nothing can be learnt: `EvolutionError`.
+/// A generation from which evolution cannot learn: `EvolutionError`.
 pub fn evolution_error(py: Python<'_>, error: &EvolutionError) -> PyErr {
     exception(py, "EvolutionError", (error.to_string(),))
 }
 
-/// A request that is refused: `FleetError`, or one of its kinds, with the name of the status.
+/// A refused request: `FleetError`, or one of its subclasses, with the name of the status.
 pub fn refused(py: Python<'_>, status: &Status) -> PyErr {
     let mut code = String::new();
     for (i, letter) in format!("{:?}", status.code()).chars().enumerate() {
@@ -40,7 +41,7 @@ pub fn refused(py: Python<'_>, status: &Status) -> PyErr {
     exception(py, "refused", (code, status.message()))
 }
 
-/// What the caller asked for cannot be simulated.
+/// A request that cannot be simulated.
 pub fn evaluate_error(error: &EvaluateError) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
@@ -50,7 +51,7 @@ pub fn panic_error(py: Python<'_>, message: &str) -> PyErr {
     exception(py, "InternalError", (message,))
 }
 
-/// Something that does not work in a process that was forked: `ForkError`.
+/// An operation that fails in a forked process: `ForkError`.
 pub fn fork_error(py: Python<'_>, message: &str) -> PyErr {
     exception(py, "ForkError", (message,))
 }

@@ -17,8 +17,8 @@ use sim_core::{FINGERPRINT, Simulation, TrialSet};
 
 use crate::{errors::evolution_error, experiment::Experiment, memory, running::Shared};
 
-/// Arrays as long as a genotype that any algorithm keeps, and those per individual while a
-/// generation is drawn and handed over: upper bounds.
+/// Upper bounds of the number of arrays of a genotype's length: those that an algorithm
+/// keeps, and those per individual while a generation is drawn and handed over.
 const KEPT_PER_GENE: u128 = 8;
 const DRAWN_PER_GENE: u128 = 4;
 
@@ -26,10 +26,11 @@ const DRAWN_PER_GENE: u128 = 4;
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Evolution(Shared<State>);
 
-/// A generation: index, best, mean, min, standard deviation, number of those not finite.
+/// A generation: index, best, mean, min, standard deviation, number of individuals
+/// without a finite fitness.
 type Summary = (u64, f64, f64, f64, f64, usize);
 
-/// Why evolution did not learn from a generation.
+/// The reason why evolution did not learn from a generation.
 enum NotTold {
     Rows(String),
     Evolution(EvolutionError),
@@ -38,13 +39,13 @@ enum NotTold {
 #[derive(Clone)]
 struct State {
     evolution: evolution::Evolution,
-    /// What `ask` has drawn since the last `tell`.
+    /// The generation that `ask` has drawn since the last `tell`.
     asked: Option<Generation>,
 }
 
 #[pymethods]
 impl Evolution {
-    /// Of one population, for any function of genes in [0, 1].
+    /// An evolution of one population, for any function of genes in [0, 1].
     #[new]
     fn new(
         algorithm: &str,
@@ -65,8 +66,8 @@ impl Evolution {
         Ok(Self::wrap(evolution))
     }
 
-    /// From what `to_json` has given. `n_flat`: of as many generations before, which are no part of
-    /// the state.
+    /// Restores the output of `to_json`. `n_flat`: the number of latest flat generations, which
+    /// the state does not contain.
     #[staticmethod]
     #[pyo3(signature = (text, n_flat=0))]
     fn from_json(text: &str, n_flat: u64) -> PyResult<Self> {
@@ -83,7 +84,7 @@ impl Evolution {
         self.0.with(py, |state| state.evolution.n_flat())
     }
 
-    /// The state.
+    /// The state as JSON.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         let text = self.0.with(py, |state| serde_json::to_string(&state.evolution))?;
         text.map_err(|error| PyRuntimeError::new_err(error.to_string()))
@@ -100,10 +101,10 @@ impl Evolution {
         Ok(PyArray2::from_vec2(py, &genotypes)?)
     }
 
-    /// Learns from the fitness of the generation that was asked for, `[P, T]`; if it cannot, it
-    /// stays as it was. `experiment`: the one that it is a run of. Returns the index of the
-    /// generation, best, mean, min, standard deviation, the number of those that are not finite,
-    /// what is worth a word, and why the generation is the last one of the run.
+    /// Learns from the fitness `[P, T]` of the generation that `ask` returned; an error leaves
+    /// it unchanged. `experiment`: the experiment of this run. Returns the index of the
+    /// generation, best, mean, min, standard deviation, the number of individuals without a
+    /// finite fitness, the notices, and the reason if the generation is the last one of the run.
     #[pyo3(signature = (fitness, experiment=None))]
     fn tell(
         &self,
@@ -165,12 +166,12 @@ impl Evolution {
         Ok(mean.map(|mean| PyArray1::from_vec(py, mean)))
     }
 
-    /// Another one in the same state.
+    /// A copy in the same state.
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
         Ok(Self(Shared::new(self.0.with(py, |state| state.clone())?)))
     }
 
-    /// Whether an individual has come since the last comparison of candidates.
+    /// Whether there is a new individual since the last comparison of candidates.
     #[getter]
     fn has_challenger(&self, py: Python<'_>) -> PyResult<bool> {
         let is_new = |champion: &Champion| {
@@ -188,7 +189,7 @@ impl Evolution {
         Ok(reevaluation.map(|reevaluation| Reevaluation(Shared::new(reevaluation))))
     }
 
-    /// Makes the winner of a comparison that is over the champion.
+    /// Makes the winner of a finished comparison the champion.
     fn set_champion(&self, py: Python<'_>, reevaluation: &Reevaluation) -> PyResult<()> {
         let reevaluation = reevaluation.0.with(py, |reevaluation| reevaluation.clone())?;
         if !reevaluation.is_over() {
@@ -226,17 +227,17 @@ impl Evolution {
 }
 
 impl Evolution {
-    /// One that Python has as its own.
+    /// An evolution as an object of Python.
     pub fn wrap(evolution: evolution::Evolution) -> Self {
         Self(Shared::new(State { evolution, asked: None }))
     }
 
-    /// It, as it is now.
+    /// A copy of its present state.
     pub fn state(&self, py: Python<'_>) -> PyResult<evolution::Evolution> {
         self.0.with(py, |state| state.evolution.clone())
     }
 
-    /// As the coordinator's of the same file.
+    /// Like the coordinator's evolution of the same file.
     pub fn of_experiment(config: &ExperimentConfig, simulation: &Simulation) -> Self {
         let segments = simulation.population_segments();
         Self::wrap(evolution::Evolution::new(config, segments, FINGERPRINT))
@@ -257,7 +258,7 @@ impl Reevaluation {
         next.map(|(genotypes, trials)| asked_trials(py, &genotypes, trials)).transpose()
     }
 
-    /// Takes the fitness of a block in.
+    /// Records the fitness of a block.
     fn tell(&self, py: Python<'_>, fitness: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
         let fitness = rows(&fitness);
         let told = self.0.with(py, |reevaluation| {
@@ -272,18 +273,18 @@ impl Reevaluation {
     }
 }
 
-/// That there is a row for each genotype, with a number for each trial.
+/// Checks that there is a row for each genotype, with a number for each trial.
 fn check_rows(fitness: &[Vec<f64>], n_genotypes: usize) -> Result<(), String> {
     if fitness.len() == n_genotypes && !fitness.iter().any(Vec::is_empty) {
         return Ok(());
     }
     Err(format!(
-        "there are {n_genotypes} genotypes; their fitness has to be an array of {n_genotypes} \
+        "there are {n_genotypes} genotypes; their fitness must be an array of {n_genotypes} \
          numbers, or of {n_genotypes} rows with a number for each trial"
     ))
 }
 
-/// Genotypes `[P, d]`; kind, generation and block of the trials that they are to meet.
+/// Genotypes `[P, d]`; kind, generation and block of their trials.
 type AskedTrials<'py> = (Bound<'py, PyArray2<f64>>, (&'static str, u64, u8));
 
 fn asked_trials<'py>(
@@ -328,8 +329,8 @@ pub fn rows(array: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
     array.as_array().rows().into_iter().map(|row| row.to_vec()).collect()
 }
 
-/// Parameters from Python. A number is of the kind that the parameter has, if it fits;
-/// otherwise `Setup` says what would.
+/// Parameters from Python. A number takes the type of its parameter, if it fits;
+/// otherwise the error of `Setup` states the valid values.
 fn read_params(algorithm: &str, given: &Bound<'_, PyDict>) -> PyResult<Params> {
     let mut params = Params::default();
     let described = AlgorithmDescription::find(ALGORITHMS, algorithm);
@@ -352,13 +353,13 @@ fn read_params(algorithm: &str, given: &Bound<'_, PyDict>) -> PyResult<Params> {
     Ok(params)
 }
 
-/// What speaks against a population of this size, if anything does.
+/// The warning about a population of this size, if any.
 #[pyfunction]
 pub fn advice(algorithm: &str, population_size: u32) -> Option<String> {
     AlgorithmDescription::find(ALGORITHMS, algorithm)?.advice(population_size)
 }
 
-/// The algorithms: name, title, and of each parameter key, what it may be, default and
+/// The algorithms: name, title, and for each parameter its key, valid values, default and
 /// meaning.
 #[pyfunction]
 pub fn algorithms() -> Vec<(&'static str, &'static str, Vec<[String; 4]>)> {

@@ -1,4 +1,4 @@
-//! An experiment, compiled: what `swarmevo.Experiment` is made of.
+//! A compiled experiment, the core of `swarmevo.Experiment`.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::{
     trials::Trials,
 };
 
-/// An experiment file that has been read and compiled.
+/// An experiment file, read and compiled.
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Experiment {
     config: ExperimentConfig,
@@ -26,13 +26,13 @@ pub struct Experiment {
     warnings: Vec<String>,
 }
 
-/// The path of the script that a file's text refers to; none if it has none, or has it in it.
+/// The path of the script that a file's text names; none if it has no script, or contains it.
 #[pyfunction]
 pub fn script_path(text: &str) -> Option<String> {
     experiment_file::script_path(text).map(|(path, _)| path)
 }
 
-/// A file's text with the script in the place of its path.
+/// A file's text, with the script instead of its path.
 #[pyfunction]
 pub fn inline_script(text: &str, name: String, script: String) -> String {
     match experiment_file::script_path(text) {
@@ -63,7 +63,7 @@ impl Experiment {
         &self.config.name
     }
 
-    /// Link -1 of the digest chain: equal ones, the same bits of every generation.
+    /// Link -1 of the digest chain: equal links mean the same bits of every generation.
     #[getter]
     fn config_digest(&self) -> String {
         Digest::of_config(&self.config, FINGERPRINT).to_string()
@@ -108,7 +108,7 @@ impl Experiment {
         })
     }
 
-    /// As `evaluate`, and all measures of all steps: `[P * T * (1 + S * K)]`.
+    /// Like `evaluate`, with all measures of all steps: `[P * T * (1 + S * K)]`.
     fn measure<'py>(
         &self,
         py: Python<'py>,
@@ -122,7 +122,7 @@ impl Experiment {
         })
     }
 
-    /// Everything that there is to see of a genotype in T trials: arrays by name.
+    /// All recorded values of a genotype in T trials: arrays by name.
     fn simulate<'py>(
         &self,
         py: Python<'py>,
@@ -149,7 +149,7 @@ impl Experiment {
         network.map(|network| network.to_string()).map_err(|error| evaluate_error(&error))
     }
 
-    /// An episode with the player, as an HTML file.
+    /// The player with an episode, as an HTML file.
     fn replay_html(
         &self,
         py: Python<'_>,
@@ -189,7 +189,7 @@ impl Experiment {
         self.config.to_canonical_json()
     }
 
-    /// Computes P genotypes, in so many items that all threads have something to do.
+    /// Computes P genotypes, in enough items to occupy all threads.
     fn of_all<'py>(
         &self,
         py: Python<'py>,
@@ -204,10 +204,11 @@ impl Experiment {
         + Sync,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (n_genotypes, n_genes) = genotypes.as_array().dim();
-        // A copy: nobody writes to it while the lock is not held.
+        // A copy, because Python code may write to the original while the lock is
+        // released.
         let genes = genotypes.to_vec()?;
         let (set, range) = (trials.set()?, trials.range());
-        // Trials of a genotype are fastest side by side; they are parted only where there are
+        // Trials of a genotype are fastest side by side; they are split only if there are
         // fewer genotypes than threads.
         let n_parts = n_threads.div_ceil(n_genotypes.max(1)).clamp(1, range.len().max(1));
         let part_len = range.len().div_ceil(n_parts).max(1);

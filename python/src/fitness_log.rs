@@ -1,4 +1,4 @@
-//! What evolution was told, read from the database of a data directory without the genotypes.
+//! The fitness log, read from the database of a data directory without the genotypes.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use pyo3::{exceptions::PyOSError, prelude::*};
 
 use crate::running::guarded;
 
-/// The fitness `[P, T]` of at most `limit` generations from `first` on; none for those that the log
-/// lacks.
+/// The fitness `[P, T]` of at most `limit` generations from `first` on; none for missing
+/// generations.
 #[pyfunction]
 pub fn fitness_log<'py>(
     py: Python<'py>,

@@ -1,12 +1,12 @@
-//! Genotypes on their way to a fleet.
+//! Genotypes encoded for a fleet.
 
 use numpy::PyReadonlyArray2;
 use prost::Message as _;
 use pyo3::{prelude::*, types::PyBytes};
 use swarm_proto::v1::Genes;
 
-/// Genotypes `[P, d]`, each as the bytes of a message `Genes`: by way of Python's lists it takes
-/// ten times as long.
+/// Genotypes `[P, d]`, each as the bytes of a message `Genes`. Going through Python's lists
+/// takes ten times as long.
 #[pyfunction]
 pub fn encode_genes<'py>(
     py: Python<'py>,

@@ -1,5 +1,5 @@
 //! The extension behind the Python package `swarmevo`: the simulator and the algorithms.
-//! `swarmevo/*.py` is what people see of it.
+//! `swarmevo/*.py` is its public interface.
 
 mod database;
 mod errors;
@@ -37,13 +37,13 @@ mod _core {
     #[pymodule_export]
     const FINGERPRINT: &str = sim_core::FINGERPRINT;
 
-    /// Of the project.
+    /// Version of the project.
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-    /// An experiment file to begin with.
+    /// A first experiment file.
     #[pymodule_export]
-    // A link: the package of sources has no folder configs/.
+    // This file is a link, because the sdist has no folder configs/.
     const QUICKSTART: &str = include_str!("quickstart.json");
 
     /// The gRPC protocol, as a set of file descriptors.

@@ -1,18 +1,17 @@
-//! Whether there is memory for something, asked before it is allocated: an allocation that fails
-//! would end the interpreter.
+//! Checks of free memory before an allocation: a failed allocation would end the interpreter.
 
 use std::fs;
 
 use pyo3::{exceptions::PyMemoryError, prelude::*};
 
-/// Raises `MemoryError` if there is no room for so many bytes. `what`: who takes them.
+/// Raises `MemoryError` if so many bytes do not fit. `what`: the object that needs them.
 #[pyfunction(name = "ensure_memory")]
 #[expect(clippy::needless_pass_by_value, reason = "numbers from Python")]
 pub fn ensure_memory(bytes: u128, what: String) -> PyResult<()> {
     ensure(bytes, &what)
 }
 
-/// As `ensure_memory`.
+/// Like `ensure_memory`.
 pub fn ensure(bytes: u128, what: &str) -> PyResult<()> {
     let free = free();
     let fits = free.is_none_or(|free| bytes <= free);
@@ -27,7 +26,7 @@ fn can_be_reserved(bytes: usize) -> bool {
     Vec::<u8>::new().try_reserve_exact(bytes).is_ok()
 }
 
-/// Bytes that this process may still take, where the system says so.
+/// Bytes that this process may still allocate, if the system tells.
 fn free() -> Option<u128> {
     [of_machine(), of_container()].into_iter().flatten().min()
 }
@@ -39,7 +38,7 @@ fn of_machine() -> Option<u128> {
     Some(kibibytes << 10)
 }
 
-/// What the limit of a container leaves (control groups, version 2).
+/// Bytes that the limit of a container leaves (control groups, version 2).
 fn of_container() -> Option<u128> {
     let number = |name: &str| -> Option<u128> {
         fs::read_to_string(format!("/sys/fs/cgroup/{name}")).ok()?.trim().parse().ok()

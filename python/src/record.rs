@@ -1,4 +1,4 @@
-//! Whole runs of this process in the database of a data directory.
+//! Runs of this process in the database of a data directory.
 
 use std::{path::Path, time::Duration};
 
@@ -19,7 +19,7 @@ use crate::{
     running::{Shared, guarded},
 };
 
-/// An experiment in a data directory, which nobody else changes meanwhile.
+/// An experiment in a data directory, which no other program changes meanwhile.
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Record(Shared<Option<LocalRun>>);
 
@@ -27,7 +27,7 @@ type Blocks<'py> = Vec<PyReadonlyArray2<'py, f64>>;
 
 #[pymethods]
 impl Record {
-    /// Finds the experiment, or begins it.
+    /// Finds the experiment, or starts it.
     #[new]
     fn new(py: Python<'_>, directory: &str, experiment: &Experiment) -> PyResult<Self> {
         let text = experiment.text();
@@ -36,7 +36,7 @@ impl Record {
         Ok(Self(Shared::new(Some(opened))))
     }
 
-    /// Its number, whether it has completed, and the last link of its digest chain.
+    /// Its number, whether it is complete, and the last link of its digest chain.
     fn state(&self, py: Python<'_>) -> PyResult<(u64, bool, String)> {
         self.ask(py, |run| {
             let record = run.record()?;
@@ -56,7 +56,7 @@ impl Record {
         champion.map(|champion| champion_dict(py, &champion)).transpose()
     }
 
-    /// Of every generation: index, best, mean, min, standard deviation, digest, ms.
+    /// For every generation: index, best, mean, min, standard deviation, digest, ms.
     #[expect(clippy::type_complexity, reason = "a row")]
     fn history(&self, py: Python<'_>) -> PyResult<Vec<(u64, f64, f64, f64, f64, String, u64)>> {
         let history = self.ask(py, |run| Ok(run.history()?))?;
@@ -69,9 +69,9 @@ impl Record {
         Ok(rows.collect())
     }
 
-    /// Stores a generation: evolution after it, its fitness, that of the blocks of the
-    /// comparison that was due, of the one that was only the end's, and of the judgement, and
-    /// what is worth a word.
+    /// Stores a generation: the evolution after it; the fitness of its individuals, of the
+    /// blocks of a scheduled comparison, of one at the end only, and of the judgement; and
+    /// the notices.
     #[expect(clippy::too_many_arguments, reason = "they are one generation")]
     fn commit(
         &self,
@@ -106,12 +106,12 @@ impl Record {
         })
     }
 
-    /// Ends the experiment, which has failed.
+    /// Marks the experiment as failed.
     fn fail(&self, py: Python<'_>, reason: String) -> PyResult<()> {
         self.ask(py, move |run| Ok(run.fail(&reason)?))
     }
 
-    /// Lets others into the directory.
+    /// Releases the directory for other programs.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         self.0.with(py, |run| *run = None)
     }

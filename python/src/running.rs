@@ -20,13 +20,13 @@ use sim_core::EvaluateError;
 
 use crate::errors::{evaluate_error, fork_error, panic_error};
 
-/// How often the interpreter is asked whether a signal has come.
+/// How often the computation checks for signals.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Whether to go on; a computation asks now and then.
+/// Whether to continue; a computation checks it from time to time.
 pub type KeepGoing<'a> = &'a dyn Fn() -> bool;
 
-/// Why there is no result.
+/// The reason why there is no result.
 enum Failure {
     Evaluate(EvaluateError),
     Panic(String),
@@ -35,7 +35,7 @@ enum Failure {
 }
 
 /// Computes `work` of 0..`n_items` on `n_threads` threads and returns the results in order.
-/// `work` returns none only if it was told not to go on.
+/// `work` returns none only after it was told to stop.
 pub fn compute<T: Send>(
     py: Python<'_>,
     n_items: usize,
@@ -44,7 +44,7 @@ pub fn compute<T: Send>(
 ) -> PyResult<Vec<T>> {
     let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
     let keep_going = || !stopped.load(Ordering::Relaxed);
-    // A thread: what is left of the items, until there are none.
+    // A thread: computes remaining items until none are left.
     let work_off = || {
         let mut done = Vec::new();
         while keep_going() {
@@ -72,7 +72,7 @@ pub fn compute<T: Send>(
                     // The receiver reads until all senders are gone.
                     let _ = outbox.send(outcome);
                 });
-                // Fewer threads than were asked for give the same bits.
+                // Fewer threads than requested give the same bits.
                 if let Err(error) = started {
                     failure = (number == 0).then_some(Failure::NoThread(error));
                     break;
@@ -114,14 +114,14 @@ pub fn compute<T: Send>(
     }
 }
 
-/// Computes something short, without the interpreter's lock.
+/// Runs a short computation without the interpreter's lock.
 pub fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| catch_unwind(AssertUnwindSafe(work)).map_err(|panic| panic_message(&*panic)))
         .map_err(|message| panic_error(py, &message))
 }
 
-/// The process in which something was made. A process that is forked from it has none of its
-/// threads, and locks that those held stay locked.
+/// The process in which an object was made. A forked process lacks its threads, and locks
+/// that those held stay locked.
 #[derive(Clone, Copy)]
 pub struct Home(u32);
 
@@ -131,26 +131,26 @@ impl Home {
         Self(process::id())
     }
 
-    /// Whether this is another process.
+    /// Whether this is a different process.
     pub fn is_left(self) -> bool {
         self.0 != process::id()
     }
 }
 
-/// A value that threads share. Whoever asks for it in a forked process never waits for a thread
-/// that is not there.
+/// A value that threads share. A forked process never waits for a thread that does not exist
+/// there.
 pub struct Shared<T> {
     value: Mutex<T>,
     home: Home,
 }
 
 impl<T: Send> Shared<T> {
-    /// It, from this process on.
+    /// Wraps a value, owned by this process.
     pub fn new(value: T) -> Self {
         Self { value: Mutex::new(value), home: Home::here() }
     }
 
-    /// Does something short with it, without the interpreter's lock.
+    /// Runs a short function on the value, without the interpreter's lock.
     pub fn with<R: Send>(
         &self,
         py: Python<'_>,
@@ -160,7 +160,8 @@ impl<T: Send> Shared<T> {
         done.ok_or_else(|| fork_error(py, "another thread used this when the process was forked"))
     }
 
-    /// None if whoever has it did not come along. A panic leaves a value that can be read.
+    /// None if a thread of the parent process held it at the fork. After a panic, the
+    /// value is still readable.
     fn lock(&self) -> Option<MutexGuard<'_, T>> {
         if !self.home.is_left() {
             return Some(self.value.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));

@@ -1,4 +1,4 @@
-//! Episodes step by step. A thread of their own holds them, because they borrow the experiment.
+//! Episodes step by step. A separate thread holds them, because they borrow the experiment.
 
 use std::{
     any::Any,
@@ -19,22 +19,22 @@ use crate::{
     running::Home,
 };
 
-/// Trials side by side, with agents that do what they are told.
+/// Trials side by side, whose agents take their actions from the caller.
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Episodes {
-    /// To the thread, which ends when this is dropped.
+    /// The channel to the thread, which ends when this is dropped.
     work: Mutex<Sender<Work>>,
-    /// Where the thread is.
+    /// The process of the thread.
     home: Home,
     agents: Vec<usize>,
     n_inputs: usize,
     message_len: usize,
 }
 
-/// Something to be done by the thread.
+/// A job for the thread.
 type Work = Box<dyn for<'a> FnOnce(&mut Stage<'a>) + Send>;
 
-/// What the thread has.
+/// The state of the thread.
 struct Stage<'a> {
     stepper: Stepper<'a>,
     policy: Option<Policy<'a>>,
@@ -60,38 +60,38 @@ impl Episodes {
         self.message_len
     }
 
-    /// Whether a forked process asks, which has not the thread.
+    /// Whether this is a forked process, which lacks the thread.
     #[getter]
     fn is_left(&self) -> bool {
         self.home.is_left()
     }
 
-    /// What the agents get, flat: `[T * A * I]`.
+    /// The inputs of the agents, flat: `[T * A * I]`.
     fn stimuli<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f32>> {
         Ok(self.ask(py, |stage| stage.stepper.stimuli())?.into_pyarray(py))
     }
 
-    /// Has the agents get this instead in this step, flat.
+    /// Replaces the inputs of the agents in this step, flat.
     fn set_stimuli(&self, py: Python<'_>, stimuli: PyReadonlyArray1<'_, f32>) -> PyResult<()> {
         let stimuli = stimuli.to_vec()?;
         let set = self.ask(py, move |stage| stage.stepper.set_stimuli(&stimuli))?;
         set.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// Has agents emit nothing in this step, flat.
+    /// Silences agents in this step, flat.
     fn silence(&self, py: Python<'_>, silent: PyReadonlyArray1<'_, bool>) -> PyResult<()> {
         let silent = silent.to_vec()?;
         let silenced = self.ask(py, move |stage| stage.stepper.silence(&silent))?;
         silenced.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// Whether agents sent their own message in the step before, flat: `[T * A]`.
+    /// Whether agents sent their own message in the previous step, flat: `[T * A]`.
     fn sent<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, bool>> {
         Ok(self.ask(py, |stage| stage.stepper.sent())?.into_pyarray(py))
     }
 
-    /// One step with these actions, flat. Returns its fitness in each trial, NaN where it does
-    /// not count.
+    /// Takes one step with these actions, flat. Returns its fitness in each trial, NaN if the
+    /// step does not count.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -113,7 +113,7 @@ impl Episodes {
         Ok(fitness.collect::<Vec<_>>().into_pyarray(py))
     }
 
-    /// Makes the network of a genotype ready, at rest.
+    /// Loads the network of a genotype, at rest.
     fn load(&self, py: Python<'_>, genotype: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
         let genotype = genotype.to_vec()?;
         let loaded = self.ask(py, move |stage| {
@@ -123,7 +123,7 @@ impl Episodes {
         loaded.map_err(|error: EvaluateError| evaluate_error(&error))
     }
 
-    /// What the network has the agents do: wheels, LEDs, whether they send, messages, flat.
+    /// The actions that the network decides: wheels, LEDs, whether to send, messages, flat.
     #[expect(clippy::type_complexity, reason = "four arrays")]
     fn decide<'py>(
         &self,
@@ -146,7 +146,7 @@ impl Episodes {
 }
 
 impl Episodes {
-    /// The trials before their first step.
+    /// Starts the trials, before their first step.
     pub fn start(
         py: Python<'_>,
         simulation: Arc<Simulation>,
@@ -173,7 +173,7 @@ impl Episodes {
         Ok(Self { work: Mutex::new(work), home: Home::here(), agents, n_inputs, message_len })
     }
 
-    /// Has the thread do something, and waits for it.
+    /// Runs a job on the thread, and waits for it.
     fn ask<T: Any + Send>(
         &self,
         py: Python<'_>,
@@ -184,7 +184,7 @@ impl Episodes {
         }
         let (answer, answered) = mpsc::channel();
         let work: Work = Box::new(move |stage| {
-            // Whoever asked waits.
+            // The caller waits for the answer.
             let _ = answer.send(work(stage));
         });
         let sent = self.work.lock().unwrap_or_else(PoisonError::into_inner).send(work);
@@ -193,7 +193,7 @@ impl Episodes {
     }
 }
 
-/// The thread has ended, which only a panic makes it do.
+/// The error of a thread that has ended, which only a panic causes.
 fn has_panicked(py: Python<'_>) -> PyErr {
     panic_error(py, "the simulation of these episodes has panicked")
 }

@@ -1,4 +1,4 @@
-//! What there is to see in episodes, as arrays.
+//! The recorded values of episodes, as arrays.
 
 use numpy::{Element, IntoPyArray as _, PyArrayMethods as _, PyUntypedArrayMethods as _};
 use pyo3::{prelude::*, types::PyDict};
@@ -30,7 +30,7 @@ pub struct Recording {
     lights: Vec<f64>,
     areas: Vec<f64>,
     fitness: Vec<f64>,
-    /// Stimuli, neurons and voltages of the robot that has most of them.
+    /// Maximum number of stimuli, neurons and voltages of a robot.
     widths: [usize; 3],
 }
 
@@ -93,7 +93,7 @@ impl Recording {
         self.frame_signals.push(frame.map_or(0.0, |frame| frame.signal));
         self.frame_messages.extend(&robot.received_message);
         self.targets.push(robot.target.map_or(-1, i8::from));
-        // They are of 32 bits where they come from.
+        // The simulator computes them with 32 bits.
         let [n_stimuli, n_neurons, n_voltages] = self.widths;
         pad(&mut self.stimuli, &robot.stimuli, n_stimuli);
         pad(&mut self.activities, &robot.activity, n_neurons);
@@ -149,7 +149,7 @@ impl Recording {
         Ok(arrays.dict)
     }
 
-    /// The first is moved, the others are copied.
+    /// Moves the first one and copies the others.
     fn append(&mut self, other: Self) {
         join(&mut self.positions, other.positions);
         join(&mut self.headings, other.headings);
@@ -175,7 +175,7 @@ impl Recording {
     }
 }
 
-/// Adds a robot's values, and NaN for those that other robots have and it has not.
+/// Adds a robot's values, and NaN for values that only other robots have.
 fn pad(column: &mut Vec<f32>, values: &[f64], width: usize) {
     column.extend(values.iter().map(|&value| value as f32));
     column.extend((values.len()..width).map(|_| f32::NAN));

@@ -1,10 +1,10 @@
-//! Which trials: how Python names them.
+//! Trials, as Python names them.
 
 use pyo3::{exceptions::PyValueError, prelude::*};
 use sim_core::TrialSet;
 
-/// A set of trials and a range of it, as `swarmevo.trials` gives them: the kind, the
-/// generation, the block, the first trial and the one after the last.
+/// A range of a trial set, from `swarmevo.trials`: the kind, the generation, the block,
+/// the first trial and the one after the last.
 #[derive(FromPyObject)]
 pub struct Trials(String, u64, u8, u32, u32);
 
@@ -21,7 +21,7 @@ impl Trials {
         })
     }
 
-    /// The trials of it.
+    /// The range of trials.
     pub fn range(&self) -> std::ops::Range<u32> {
         self.3..self.4
     }

@@ -19,7 +19,7 @@ use crate::{errors::fork_error, running::Home};
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Worker {
     stop: CancellationToken,
-    /// Where the thread is.
+    /// The process of the thread.
     home: Home,
     thread: Mutex<Option<JoinHandle<Result<(), WorkerError>>>>,
 }
@@ -46,7 +46,7 @@ impl Worker {
         Ok(Self { stop, home: Home::here(), thread: Mutex::new(Some(thread)) })
     }
 
-    /// Whether it has not ended: it only ends by itself if the coordinator refuses it.
+    /// Whether it still runs: it ends by itself only if the coordinator refuses it.
     fn is_alive(&self) -> bool {
         if self.home.is_left() {
             return false;
@@ -55,7 +55,7 @@ impl Worker {
         thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
-    /// Tells it to finish what it computes, and to leave.
+    /// Tells it to finish its items and to leave.
     fn stop(&self) {
         if self.home.is_left() {
             return;
@@ -63,7 +63,7 @@ impl Worker {
         self.stop.cancel();
     }
 
-    /// Waits for its end. Raises why it has ended, if it was not told to.
+    /// Waits for its end. Raises the reason if it ended without being told to.
     fn join(&self, py: Python<'_>) -> PyResult<()> {
         if self.home.is_left() {
             return Err(fork_error(py, "the thread of this worker is in another process"));
@@ -102,7 +102,7 @@ fn credentials(token: Option<&str>, tls: Tls) -> PyResult<Credentials> {
     };
     let token = token.map(Token::parse).transpose();
     let token = token.map_err(|problem| PyValueError::new_err(format!("the token {problem}")))?;
-    // The variable is read where the workers are asked for, not where they run.
+    // The variable is read in the process that requests the workers, not where they run.
     let read = args.load(None, "SWARM_NO_TOKEN");
     let read = read.map_err(|error| PyValueError::new_err(error.to_string()))?;
     Ok(Credentials { token, ..read })

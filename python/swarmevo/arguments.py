@@ -1,6 +1,6 @@
-"""Checks of everything that callers give: numbers, arrays and names pass here.
+"""Checks of all arguments of callers: numbers, arrays and names.
 
-Whatever does not fit is a ``ValueError`` that says what would.
+An invalid argument is a ``ValueError`` that states the valid values.
 """
 
 from __future__ import annotations
@@ -62,13 +62,13 @@ def name_of(value: Any, name: str) -> str:
 
 
 def callable_of(value: Any, name: str) -> None:
-    """That it is a function, or None."""
+    """Checks that an argument is a function or None."""
     if value is not None and not callable(value):
         raise ValueError(f"{name} is a function, not {reprlib.repr(value)}")
 
 
 def known(given: Iterable[str], names: Iterable[str], what: str) -> None:
-    """That all that is given is among the names; else says which name is meant.
+    """Checks that all given names are known; otherwise suggests the intended one.
 
     >>> known(["weels"], ["wheels", "led"], "action")
     Traceback (most recent call last):
@@ -86,14 +86,14 @@ def known(given: Iterable[str], names: Iterable[str], what: str) -> None:
 
 
 def misspelt(given: Iterable[str], names: Iterable[str], what: str) -> None:
-    """That nothing that is given looks like one of the names without being one: others may have their own."""
+    """Checks that no given name is a misspelling of a known one: other unknown names are allowed."""
     names = list(names)
     meant = [it for it in given if it not in names and isinstance(it, str) and difflib.get_close_matches(it, names)]
     known(meant, names, what)
 
 
 def numbers(value: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
-    """An array of numbers, from whatever array, list or tuple of real numbers; in row order."""
+    """An array of numbers, from any array, list or tuple of real numbers; in row order."""
     try:
         array = np.asarray(value)
         is_plain = array.dtype.kind not in "OSUcMmV" or _is_small_float(array)
@@ -106,7 +106,7 @@ def numbers(value: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
                 return np.asarray(array, dtype=dtype, order="C")
         kind = "masked values" if np.ma.isMaskedArray(value) else f"{array.dtype}"
         problem = f"of {kind}"
-    # Lists of unequal length, tensors on another device: every library has its own.
+    # Lists of unequal length, tensors on another device: each library has its own errors.
     except Exception as error:
         problem = f"({type(error).__name__}: {error})"
     raise ValueError(f"{name}: an array of real numbers is needed, not {type(value).__name__} {problem}")
@@ -133,7 +133,8 @@ def array_of(value: Any, name: str, shape: tuple[int, ...], dtype: Any = np.floa
 
 
 def plain(value: Any) -> Any:
-    """A value of an experiment file; arrays and numbers of other libraries are lists and numbers."""
+    """A value of an experiment file; converts arrays and numbers of other libraries to lists and
+    numbers."""
     if value is None or isinstance(value, (bool, int, float, str, dict, list)):
         return value
     if isinstance(value, Mapping):
@@ -147,21 +148,21 @@ def plain(value: Any) -> Any:
 
 def fitness_of(value: Any, n_genotypes: int, n_trials: int) -> Floats:
     """The fitness ``[P, T]`` that a function has returned, or ``[P, 1]`` for a function without
-    noise, which returns ``[P]``: a copy of 64 bits, whatever it was."""
+    noise, which returns ``[P]``: a copy with 64 bits, of any type."""
     fitness = numbers(value, "the fitness that `evaluate` returned").copy()
     if fitness.shape == (n_genotypes,):
         return fitness[:, np.newaxis]
     if fitness.shape != (n_genotypes, n_trials):
         raise ValueError(
-            f"`evaluate` has to return an array [{n_genotypes}, {n_trials}], a row for each of the "
-            f"{n_genotypes} genotypes and a number for each of the {n_trials} trials that it was asked for "
+            f"`evaluate` must return an array [{n_genotypes}, {n_trials}], a row for each of the "
+            f"{n_genotypes} genotypes and a number for each of the {n_trials} requested trials "
             f"(or [{n_genotypes}], without trials), not {list(fitness.shape)}"
         )
     return fitness
 
 
 def genotypes_of(value: Any, n_genes: int) -> tuple[Floats, bool]:
-    """Genotypes ``[P, d]``, and whether one ``[d]`` was given."""
+    """Genotypes ``[P, d]``, and whether the argument was a single one ``[d]``."""
     genes = numbers(value, "genotypes")
     is_one = genes.ndim == 1
     if is_one:

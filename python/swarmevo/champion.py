@@ -1,4 +1,4 @@
-"""Champions, and what is known of them."""
+"""Champions, their fitness and their origin."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 class Selection(NamedTuple):
-    """Fitness on the trials by which a champion was compared with other candidates: optimistic."""
+    """Fitness on the trials that selected a champion among the candidates: optimistic."""
 
     mean: float
     n_trials: int
@@ -33,12 +33,13 @@ class Judged(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """In what a champion was evolved."""
+    """The experiment in which a champion evolved."""
 
     config_digest: str
-    """Of the experiment file with its seed, and of the simulation: see :attr:`Experiment.config_digest`."""
+    """Digest of the experiment file with its seed, and of the simulation: see
+    :attr:`Experiment.config_digest`."""
     name: str
-    """Of the experiment; it influences nothing."""
+    """Name of the experiment; it influences nothing."""
     seed: int | None
     simulation: str | None
     """The simulation's ``FINGERPRINT``."""
@@ -46,7 +47,7 @@ class Origin(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Champion:
-    """A genotype worth keeping, and what is known of it."""
+    """The best genotype of a run, its fitness and its origin."""
 
     genotype: Floats
     """``[d]``"""
@@ -55,21 +56,22 @@ class Champion:
     individual: int | None
     """Its index there; none if it is the mean of the distribution."""
     trial_fitness: Floats
-    """``[T]``: by which it became a candidate; empty for a mean."""
+    """``[T]``: the fitness that made it a candidate; empty for a mean."""
     selection: Selection | None
-    """Mean on the trials by which it was compared with other candidates, which is
-    optimistic, and their number; none before the first comparison."""
+    """Mean on the trials that selected it among the candidates, which is optimistic, and their
+    number; none before the first comparison."""
     judged: Judged | None
-    """What it is worth, on trials that selected nothing: mean, the 95 % interval's lower and
-    upper end, number of trials; none before the end of a run, and if a trial's fitness is not finite."""
+    """Fitness on trials that selected nothing: mean, the 95 % interval's lower and upper end, number of
+    trials; none before the end of a run, and if a trial's fitness is not finite."""
 
     origin: Origin | None = None
-    """In what it was evolved; none if that was no experiment. Where a champion meets an experiment, such as in
-    ``experiment.simulate(champion)``, the two are compared: :meth:`Experiment.check`."""
+    """The experiment in which it evolved, if any. Functions that take a champion and an experiment, such as
+    ``experiment.simulate(champion)``, compare the two: :meth:`Experiment.check`."""
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str]) -> Champion:
-        """Reads a champion file, as ``swarmctl run`` writes it and ``swarmctl champion --output json`` prints it."""
+        """Reads a champion file, as written by ``swarmctl run`` and printed by ``swarmctl champion --output
+        json``."""
         path = Path(path)
         try:
             found = json.loads(path.read_text(encoding="utf-8-sig"))
@@ -82,7 +84,7 @@ class Champion:
 
     @classmethod
     def _of(cls, found: Mapping[str, Any], origin: Origin | None = None) -> Champion:
-        """What the extension knows of it."""
+        """A champion from the extension's values."""
         selection, judged = found["selection"], found["judged"]
         return cls(
             **{
@@ -98,7 +100,7 @@ class Champion:
 
     @property
     def fitness(self) -> float:
-        """The best that is known: judged, else by selection, else in its generation."""
+        """The best known fitness: judged, else of the selection, else in its generation."""
         if self.judged is not None:
             return self.judged.mean
         if self.selection is not None:
@@ -113,7 +115,7 @@ class Champion:
 
 
 Genes = Union[ArrayLike, Champion]
-"""A genotype ``[d]``, or a champion, which is compared with the experiment that it meets."""
+"""A genotype ``[d]``, or a champion, whose origin is compared with the experiment."""
 
 
 def _of_document(found: Mapping[str, Any]) -> Champion:

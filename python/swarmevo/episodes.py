@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 @dataclass
 class Actions:
-    """What A agents do in one step of T trials."""
+    """The actions of A agents in one step of T trials."""
 
     wheels: Floats
     """``[T, A, 2]``: right and left wheel, in [-1, 1]."""
@@ -35,8 +35,8 @@ class Actions:
 
 
 class Episodes:
-    """T trials side by side, whose robots with a network, the A *agents*, do what they are
-    told. Robots with another controller decide for themselves. Use
+    """T trials side by side, in which the caller controls the A *agents*, the robots with a
+    network. Other controllers still control their robots. Use
     :meth:`Experiment.episodes`.
 
     >>> from swarmevo import Experiment
@@ -57,7 +57,7 @@ class Episodes:
         core: _core.Episodes,
     ) -> None:
         self.experiment = experiment
-        """What is simulated."""
+        """The simulated experiment."""
         self.n_trials: int = where[4] - where[3]
         """T"""
         self._where = where
@@ -74,7 +74,7 @@ class Episodes:
 
     @property
     def _core(self) -> _core.Episodes:
-        """The simulation, on a thread of its own; in a process that was forked, a new one of the same past."""
+        """The simulation, on its own thread; in a forked process, a new one with the same past."""
         if self._thread.is_left:
             self._thread = self._past.again(self.experiment._core.episodes(self._where))
         return self._thread
@@ -108,36 +108,36 @@ class Episodes:
 
     @property
     def stimuli(self) -> NDArray[np.float32]:
-        """``[T, A, I]``: what the agents get in this step; after the end, in the last one."""
+        """``[T, A, I]``: the inputs of the agents in this step; after the end, in the last one."""
         stimuli = self._core.stimuli()
         return stimuli.reshape(self.n_trials, len(self.agents), self.n_inputs)
 
     @stimuli.setter
     def stimuli(self, stimuli: ArrayLike) -> None:
-        """Has the agents get this instead in this step: what :meth:`decide` sees. Radios still relay what
-        they heard; what is set for inputs that an agent has not does not matter, and what is inhibited stays 0."""
+        """Replaces the agents' inputs in this step, for :meth:`decide`. Radios still relay the messages that
+        they heard. Values for inputs that an agent lacks are ignored, and inhibited inputs stay 0."""
         shape = (self.n_trials, len(self.agents), self.n_inputs)
-        # NaN is what inputs have that an agent has not.
+        # Inputs that an agent lacks are NaN.
         values = arguments.array_of(stimuli, "stimuli", shape, np.float32).reshape(-1)
         self._core.set_stimuli(values)
         self._past.add("set_stimuli", values)
 
     @property
     def sent(self) -> NDArray[np.bool_]:
-        """``[T, A]``: which agents sent their own message in the step before. That is what their actions said,
-        but for the first steps, in which all send, and for robots that fail."""
+        """``[T, A]``: whether agents sent their own message in the previous step. This follows their actions,
+        except in the first steps, in which all send, and for robots that fail."""
         return self._core.sent().reshape(self.n_trials, len(self.agents))
 
     def silence(self, silent: ArrayLike) -> None:
-        """``[T, A]``: has these agents emit nothing in this step, neither their own message nor one that they
-        relay. Hearers get the next strongest frame."""
+        """``[T, A]``: silences agents in this step, so that they emit neither their own message nor a relayed
+        one. Hearers get the next strongest frame."""
         shape = (self.n_trials, len(self.agents))
         values = arguments.array_of(silent, "who is silent", shape, np.bool_).reshape(-1)
         self._core.silence(values)
         self._past.add("silence", values)
 
     def idle(self) -> Actions:
-        """Actions of agents that stand, with the LED off, and send zeros."""
+        """Actions of agents that stand still with the LED off, and send zeros."""
         shape = (self.n_trials, len(self.agents))
         return Actions(
             np.zeros((*shape, 2)),
@@ -147,7 +147,7 @@ class Episodes:
         )
 
     def step(self, actions: Actions) -> Floats:
-        """One step. Returns its fitness ``[T]``, NaN where it does not count."""
+        """Takes one step. Returns its fitness ``[T]``, NaN if the step does not count."""
         if not isinstance(actions, Actions):
             raise ValueError(f"a step takes Actions, such as decide() and idle() give, not {type(actions).__name__}")
         shape = (self.n_trials, len(self.agents))
@@ -163,14 +163,14 @@ class Episodes:
         return fitness
 
     def load(self, genotype: Genes) -> None:
-        """Makes the network of a genotype ``[d]``, or of a champion, ready for :meth:`decide`, at rest."""
+        """Loads the network of a genotype ``[d]``, or of a champion, for :meth:`decide`, at rest."""
         genes = self.experiment._genotype(genotype)
         self._core.load(genes)
         self._past.add("load", genes)
 
     def decide(self) -> Actions:
-        """What the loaded network has the agents do. Asked once in each step, it gives the
-        bits of :meth:`Experiment.simulate`."""
+        """The actions that the loaded network decides. Called once in each step, it gives the bits
+        of :meth:`Experiment.simulate`."""
         decided = self._core.decide()
         self._past.decide(decided)
         wheels, leds, sends, messages = decided
@@ -184,7 +184,7 @@ class Episodes:
 
     @property
     def fitness(self) -> Floats:
-        """``[T]``: of each trial so far, the mean over the steps that count."""
+        """``[T]``: fitness of each trial so far, the mean over the steps that count."""
         return self._core.fitness()
 
 
@@ -193,9 +193,9 @@ def _begin(experiment: Experiment, where: tuple[str, int, int, int, int]) -> Epi
 
 
 class Past:
-    """What has been done to episodes, from which they come again: in a copy, a pickle, a forked process.
+    """The history of calls on episodes, which recreates them in a copy, a pickle or a forked process.
 
-    A step by what the network decided takes no room, since the network decides it again.
+    A step with the network's own decision takes no memory, because the network decides it again.
     """
 
     def __init__(self) -> None:
@@ -207,12 +207,12 @@ class Past:
         self._done.append((method, tuple(array.copy() for array in arrays)))
 
     def decide(self, decided: tuple[NDArray[Any], ...]) -> None:
-        """The network has decided this."""
+        """Records a decision of the network."""
         self._done.append(("decide", ()))
         self._decided = decided
 
     def step(self, told: tuple[NDArray[Any], ...]) -> None:
-        """A step by what the network has just decided, or by something else; the arrays are nobody else's."""
+        """Records a step, with the network's latest decision or with other actions; owns the arrays."""
         decided, self._decided = self._decided, None
         is_decided = decided is not None and all(mine.tobytes() == its.tobytes() for mine, its in zip(decided, told))
         if is_decided and self._done[-1][0] == "decide":
@@ -221,7 +221,7 @@ class Past:
             self._done.append(("step", told))
 
     def again(self, core: _core.Episodes) -> _core.Episodes:
-        """Does all of it to episodes that have just begun."""
+        """Repeats all calls on new episodes."""
         for method, arrays in self._done:
             if method == "decide and step":
                 core.step(*core.decide())
@@ -230,7 +230,7 @@ class Past:
         return core
 
     def copy(self) -> Past:
-        """Another one, which goes its own way."""
+        """An independent copy."""
         copied = Past()
         copied._done, copied._decided = list(self._done), self._decided
         return copied

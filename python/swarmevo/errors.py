@@ -1,4 +1,4 @@
-"""What goes wrong."""
+"""The exceptions of this package."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ class Problem(NamedTuple):
     """One mistake in an experiment file."""
 
     path: str
-    """Where, such as ``algorithm.population_size``; empty for the whole file."""
+    """Place of the mistake, such as ``algorithm.population_size``; empty for the whole file."""
     line: int | None
     """Line in the file, from 1, if the text has such a place."""
     message: str
-    """What is wrong, and what would be right."""
+    """The mistake, and the valid values."""
 
     def __str__(self) -> str:
         line = "" if self.line is None else f"line {self.line}: "
@@ -37,11 +37,12 @@ class ExperimentError(SwarmError, ValueError):
 
 
 class OtherExperimentError(SwarmError, ValueError):
-    """A champion meets an experiment that it was not evolved in: their configurations have other digests."""
+    """A champion is used with an experiment in which it did not evolve: the digests of their configurations
+    differ."""
 
     def __init__(self, reason: str, advice: str) -> None:
         self.reason = reason
-        """How they differ."""
+        """The difference between the experiments."""
         super().__init__(reason, advice)
 
     def __str__(self) -> str:
@@ -49,29 +50,30 @@ class OtherExperimentError(SwarmError, ValueError):
 
 
 class EvolutionError(SwarmError, ValueError):
-    """Evolution can learn nothing from a generation, or from any later one: no fitness is finite, or all have been the
-    same for a hundred generations while chance has driven the distribution out of all bounds."""
+    """Evolution can learn nothing from a generation, or from any later one: no fitness is finite, or all
+    individuals had the same fitness for a hundred generations while chance drove the distribution out of all
+    bounds."""
 
 
 class FleetWarning(UserWarning):
-    """What a coordinator is asked for waits: it has no workers."""
+    """A request to a coordinator waits, because the coordinator has no workers."""
 
 
 class EvolutionWarning(UserWarning):
-    """Evolution learns nothing, or less than it could: what a coordinator has as notices of a run, and ``swarmctl``
-    as warnings of a file."""
+    """Evolution learns nothing, or less than it could. A coordinator reports this as notices of a run, and
+    ``swarmctl`` as warnings about a file."""
 
 
 class InternalError(SwarmError, RuntimeError):
-    """The simulator has panicked: a bug of it, or a state of an evolution that was edited."""
+    """The simulator has panicked, because of a bug or an edited state of an evolution."""
 
 
 class FleetError(SwarmError):
-    """The coordinator has refused a request, or cannot be reached.
+    """The coordinator has refused a request, or is unreachable.
 
-    ``code`` is the name of the gRPC status, such as ``"NOT_FOUND"``; ``docs/clients.md``
-    says what each means. What would be a ValueError or KeyError here is one there, too: :class:`RefusedArgument`,
-    :class:`NotFound`.
+    ``code`` is the name of the gRPC status, such as ``"NOT_FOUND"``; ``docs/clients.md`` explains each.
+    Errors that would be a ValueError or a KeyError without a fleet are also one here:
+    :class:`RefusedArgument`, :class:`NotFound`.
     """
 
     def __init__(self, code: str, message: str) -> None:
@@ -83,11 +85,11 @@ class FleetError(SwarmError):
 
 
 class RefusedArgument(FleetError, ValueError):
-    """An argument does not fit: ``INVALID_ARGUMENT`` or ``OUT_OF_RANGE``."""
+    """An argument is invalid: ``INVALID_ARGUMENT`` or ``OUT_OF_RANGE``."""
 
 
 class NotFound(FleetError, KeyError):
-    """There is no such experiment, or nothing of it yet: ``NOT_FOUND``."""
+    """The experiment, or the requested part of it, does not exist: ``NOT_FOUND``."""
 
 
 def refused(code: str, message: str) -> FleetError:
@@ -97,5 +99,5 @@ def refused(code: str, message: str) -> FleetError:
 
 
 class ForkError(SwarmError, RuntimeError):
-    """Something does not work in a process that was forked, because its threads or connections are in another:
-    make it anew here, or start processes by ``multiprocessing.get_context("spawn")``."""
+    """An object does not work in a forked process, because its threads or connections stay in the parent:
+    create it again here, or start processes by ``multiprocessing.get_context("spawn")``."""

@@ -24,15 +24,15 @@ type of array, list or tuple of numbers; or ``[P]`` if trials do not matter, whi
 
 CHAMPION_TRIALS = 50
 JUDGEMENT_TRIALS = 200
-"""What experiment files have if they say nothing else."""
+"""Defaults of experiment files."""
 
 
 class Evolution:
     """A population of genotypes, evolved by one of the algorithms.
 
     Genes lie in [0, 1], larger fitness is better, and a fitness that is not finite ranks
-    last. The code is the coordinator's, and so are the bits. Use the class of an algorithm,
-    or :meth:`Experiment.evolution`.
+    last. The code and the results are the coordinator's, bit for bit. Use the class of an
+    algorithm, or :meth:`Experiment.evolution`.
 
     >>> evolution = SNES(10, population_size=20, seed=7)
     >>> for _ in range(200):
@@ -49,7 +49,8 @@ class Evolution:
         self, n_genes: int, *, population_size: int = 20, seed: int = 0, **params: float | str
     ) -> None:
         """``n_genes``: d, at least 1. ``params``: as in experiment files; ``docs/algorithms.md``
-        and :func:`algorithms` list them. Warns (``EvolutionWarning``) of a population that teaches nothing."""
+        and :func:`algorithms` list them. Warns (``EvolutionWarning``) of a population too small to learn
+        from."""
         if type(self) is Evolution:
             raise TypeError("use the class of an algorithm, such as SNES, or Experiment.evolution")
         n_genes = arguments.whole(n_genes, "n_genes", 0, arguments.SIZE_MAX)
@@ -80,23 +81,23 @@ class Evolution:
         return self
 
     def ask(self) -> Floats:
-        """The next generation's genotypes ``[P, d]``. Asking twice gives the same."""
+        """The next generation's genotypes ``[P, d]``. A second call gives the same."""
         return self._core.ask()
 
     def tell(self, fitness: ArrayLike) -> Generation:
         """Learns from the fitness of the genotypes that :meth:`ask` gave: ``[P]``, or
-        ``[P, T]`` for T trials of each, whose mean counts. Warns (``EvolutionWarning``) of what a
-        coordinator would have as a notice: fitness that is not finite, or the same for everybody
-        in ten generations, and distributions that are a point or far wider than the genes' range.
-        Raises ``EvolutionError``, a ValueError, and stays as it is, where a coordinator's run fails:
-        if no fitness is finite, or nothing can be learnt any more."""
+        ``[P, T]`` for T trials of each, whose mean counts. Warns (``EvolutionWarning``) where a
+        coordinator writes a notice: fitness that is not finite, or the same for all individuals in
+        ten generations, and distributions that are a point or far wider than the genes' range.
+        Raises ``EvolutionError``, a ValueError, and stays unchanged where a coordinator's run fails:
+        if no fitness is finite, or evolution cannot learn any more."""
         told = self._tell(fitness)
         for notice in told.notices:
             warnings.warn(notice, EvolutionWarning, stacklevel=2)
         return told.generation
 
     def _tell(self, fitness: ArrayLike, experiment: _core.Experiment | None = None) -> Told:
-        """``experiment``: the one that it is a run of."""
+        """``experiment``: the experiment of this run."""
         values = arguments.numbers(fitness, "fitness")
         if values.ndim == 1:
             values = values[:, np.newaxis]
@@ -107,13 +108,14 @@ class Evolution:
         return Told(Generation(index, best, mean, least, n_non_finite, self.digest, deviation), notices, completed)
 
     def compare(self, evaluate: Evaluate, trials: int | None = None) -> Champion:
-        """Compares the candidates for the champion on held-out trials, and makes the winner the champion: the
-        best individual since the last comparison, the mean of the distribution and the champion so far.
+        """Compares the candidates for the champion on held-out trials, and makes the winner the champion.
+        Candidates are the best individual since the last comparison, the mean of the distribution and the
+        champion so far.
         :func:`evolve` does so every ``champion_every`` generations.
 
-        ``evaluate``: as :func:`evolve` takes it, such as :attr:`Experiment.fitness`. ``trials``: of each block;
-        the experiment's ``champion_trials`` if absent, 50 without an experiment. Returns the champion. Whoever has
-        a fitness that is not finite does not win; if that is everybody, the champion stays.
+        ``evaluate``: as for :func:`evolve`, such as :attr:`Experiment.fitness`. ``trials``: number per block;
+        the experiment's ``champion_trials`` if absent, 50 without an experiment. Returns the champion.
+        Candidates with a fitness that is not finite cannot win; if no candidate can, the champion stays.
         """
         self._compare(evaluate, self._trials[0] if trials is None else arguments.whole(trials, "trials", 1))
         champion = self.champion
@@ -121,10 +123,10 @@ class Evolution:
         return champion
 
     def judge(self, evaluate: Evaluate, trials: int | None = None) -> Champion:
-        """Judges the champion on trials that selected nothing, as :func:`evolve` does at its end; candidates
-        that have not been compared yet are compared before. Evolution goes on as if nobody had judged.
+        """Judges the champion on trials that selected nothing, as :func:`evolve` does at its end; first
+        compares the candidates, if that is outstanding. A judgement does not affect the further evolution.
 
-        ``evaluate``: as :meth:`compare` has it. ``trials``: the experiment's ``judgement_trials`` if absent, 200
+        ``evaluate``: as for :meth:`compare`. ``trials``: the experiment's ``judgement_trials`` if absent, 200
         without an experiment. ``judged`` of the champion is none if the fitness of a trial is not finite.
         """
         return self._judge(evaluate, self._trials[1] if trials is None else arguments.whole(trials, "trials", 1)).champion
@@ -133,7 +135,7 @@ class Evolution:
         """Returns the fitness of all blocks."""
         candidates = self._core.reevaluation()
         if candidates is None:
-            raise ValueError("there is nobody to compare before the first `tell`")
+            raise ValueError("there are no candidates before the first `tell`")
         blocks = []
         while (asked := candidates.ask()) is not None:
             genotypes, trial_set = asked
@@ -144,11 +146,11 @@ class Evolution:
 
     def _judge(self, evaluate: Evaluate, n_trials: int) -> Judgement:
         ended = self.copy()
-        # A comparison that is only the end's is not what a longer run goes on from.
+        # A longer run does not continue from a comparison that only the end caused.
         blocks = ended._compare(evaluate, self._trials[0]) if self._core.has_challenger else []
         asked = ended._core.judgement()
         if asked is None:
-            raise ValueError("there is nobody to judge before the first `tell`")
+            raise ValueError("there is no champion to judge before the first `tell`")
         genotypes, trial_set = asked
         fitness = compute(evaluate, genotypes, TrialSet(*trial_set), n_trials)
         champion, digest = ended._core.judge(fitness)
@@ -161,7 +163,7 @@ class Evolution:
 
     @property
     def champion(self) -> Champion | None:
-        """The best so far; none before the first :meth:`tell`."""
+        """The best genotype so far; none before the first :meth:`tell`."""
         champion = self._core.champion
         return None if champion is None else Champion._of(champion, self._origin)
 
@@ -181,11 +183,11 @@ class Evolution:
 
     @classmethod
     def from_json(cls, text: str) -> Evolution:
-        """Goes on from :meth:`to_json`, to the same bits."""
+        """Continues from :meth:`to_json`, to the same bits."""
         return cls._of(_core.Evolution.from_json(arguments.name_of(text, "the state of an evolution")))
 
     def copy(self) -> Evolution:
-        """Another one in the same state."""
+        """A copy in the same state."""
         return type(self)._of(self._core.copy(), self._trials, self._origin)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -202,33 +204,33 @@ class Evolution:
 
 
 class Told(NamedTuple):
-    """What came of a generation."""
+    """The outcome of a generation."""
 
     generation: Generation
     notices: list[str]
-    """What is worth a word."""
+    """Notices."""
     completed: str | None
-    """Why it is the last one of a run, if it is; empty: all are done."""
+    """The reason, if it is the last generation of a run; empty: all are done."""
 
 
 class Judgement(NamedTuple):
-    """What came of the end of a run."""
+    """The outcome of the end of a run."""
 
     champion: Champion
     digest: str
     blocks: list[Floats]
-    """Fitness of the blocks of a comparison that was only the end's."""
+    """Fitness of the blocks of a comparison that only the end caused."""
     fitness: Floats
     """``[1, T]``: of the champion."""
 
 
 def compute(evaluate: Evaluate, genotypes: Floats, trial_set: TrialSet, n_trials: int) -> Floats:
-    """The fitness ``[P, T]`` by ``evaluate``, checked."""
+    """The checked fitness ``[P, T]`` from ``evaluate``."""
     return arguments.fitness_of(evaluate(genotypes, trial_set, n_trials), len(genotypes), n_trials)
 
 
 def _with_hints(problems: str, algorithm: str, given: dict[str, Any]) -> str:
-    """Problems of a setup, with the parameter that a misspelt one may mean."""
+    """Problems of a setup, with a suggestion for a misspelt parameter."""
     names = [it.key for it in algorithms()[algorithm]]
     lines = problems.splitlines()
     for i, line in enumerate(lines):

@@ -1,4 +1,4 @@
-"""Experiments: their simulation, here."""
+"""Experiments, and their simulation in this process."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 THREADS_MAX = 1024
-"""Of one computation."""
+"""Limit of the memory of one computation."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Measured:
     fitness: Floats
     """``[P, T]``: of each genotype in each trial."""
     measures: dict[str, Floats]
-    """By name, ``[P, T, steps]``; NaN where a step has none. ``docs/evaluation.md`` of the
-    project has their units."""
+    """By name, ``[P, T, steps]``; NaN for steps without a value. ``docs/evaluation.md`` of the
+    project lists their units."""
 
     __repr__ = short
 
@@ -57,8 +57,8 @@ class Experiment:
     """
 
     def __init__(self, text: str, name: str = "", seed: int | None = None) -> None:
-        """Reads an experiment file's text. ``name`` names it if the text does not, ``seed``
-        replaces its seed. Raises :class:`ExperimentError` with all that is wrong."""
+        """Reads an experiment file's text. ``name`` names it if the text does not; ``seed``
+        replaces its seed. Raises :class:`ExperimentError` with all mistakes."""
         arguments.name_of(text, "an experiment file")
         arguments.name_of(name, "name")
         seed = None if seed is None else arguments.whole(seed, "seed")
@@ -68,7 +68,8 @@ class Experiment:
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str], seed: int | None = None) -> Experiment:
-        """Reads a file, and the script that it refers to. Without a name of its own it has the file's."""
+        """Reads a file, and the script that it names. An experiment without a name gets that of the
+        file."""
         path = Path(path)
         text = path.read_text(encoding="utf-8")
         if script := _core.script_path(text):
@@ -80,12 +81,12 @@ class Experiment:
     def from_dict(
         cls, config: Mapping[str, Any], name: str = "", seed: int | None = None
     ) -> Experiment:
-        """Takes what an experiment file says, such as a changed :meth:`to_dict`."""
+        """Reads the content of an experiment file, such as a changed :meth:`to_dict`."""
         return cls(config_text(config), name, seed)
 
     @classmethod
     def quickstart(cls) -> Experiment:
-        """A small experiment to begin with: five robots agree on a leader. It is the file
+        """A small first experiment: five robots agree on a leader. It is the file
         ``configs/quickstart.json`` of the project."""
         return cls(_core.QUICKSTART, "quickstart")
 
@@ -95,7 +96,7 @@ class Experiment:
         return result
 
     def to_json(self) -> str:
-        """As :meth:`to_dict`, as text: what workers compute from, and digests hash."""
+        """Like :meth:`to_dict`, as the text that workers read and digests cover."""
         return self._json
 
     def __reduce__(self) -> tuple[type[Experiment], tuple[str]]:
@@ -142,19 +143,19 @@ class Experiment:
 
     @property
     def n_robots(self) -> int:
-        """Robots of all swarms."""
+        """Number of robots of all swarms."""
         objects = self._config["world"]["objects"].values()
         return sum(it["num_instances"] for it in objects if it["type"] == "robot")
 
     @property
     def population_size(self) -> int:
-        """Genotypes per generation that the file asks for."""
+        """Number of genotypes per generation in the file."""
         size: int = self._config["algorithm"]["population_size"]
         return size
 
     @property
     def generations(self) -> int:
-        """Generations that the file asks for."""
+        """Number of generations in the file."""
         generations: int = self._config["algorithm"]["generations"]
         return generations
 
@@ -165,9 +166,9 @@ class Experiment:
 
     @property
     def config_digest(self) -> str:
-        """Of all that decides a bit of a generation: the file but for its name, ``generations``,
-        ``target_fitness`` and ``judgement_trials``, its seed, and the simulation's ``FINGERPRINT``. Champions
-        have that of their experiment: :attr:`Champion.origin`."""
+        """Digest of everything that determines a generation: the file except for its name, ``generations``,
+        ``target_fitness`` and ``judgement_trials``; its seed; and the simulation's ``FINGERPRINT``. Champions
+        have the digest of their experiment: :attr:`Champion.origin`."""
         return self._core.config_digest
 
     @property
@@ -176,8 +177,8 @@ class Experiment:
 
     @property
     def warnings(self) -> list[str]:
-        """What ``swarmctl validate`` warns of: keys of the file that were accepted and ignored, and a population that
-        teaches nothing."""
+        """The warnings of ``swarmctl validate``: keys of the file that have no effect, and a population too
+        small to learn from."""
         return self._core.warnings
 
     def evaluate(
@@ -188,13 +189,12 @@ class Experiment:
         trials: int | range | None = None,
         threads: int | None = None,
     ) -> Floats:
-        """Fitness ``[P, T]`` of genotypes ``[P, d]``, or of a list of champions; of one, ``[d]`` or a champion,
-        ``[T]``. Champions are compared with the experiment: :meth:`check`.
+        """Fitness ``[P, T]`` of genotypes ``[P, d]`` or of a list of champions; ``[T]`` for one genotype
+        ``[d]`` or champion. Compares champions with the experiment: :meth:`check`.
 
-        ``generation``: in the trials of which generation, or a :class:`TrialSet`.
-        ``trials``: how many, or a range of them; the file's number if absent.
-        ``threads``: as many as there are processors if absent; they do not hold the
-        interpreter's lock. Ctrl-C stops it.
+        ``generation``: the generation of the trials, or a :class:`TrialSet`. ``trials``: their number,
+        or a range; the file's number if absent. ``threads``: their number, that of the processors if
+        absent; they do not hold the interpreter's lock. Ctrl-C stops the computation.
         """
         genes, is_one = self._genotypes(genotypes)
         where = address(generation, trials, self.n_trials)
@@ -210,7 +210,7 @@ class Experiment:
         trials: int | range | None = None,
         threads: int | None = None,
     ) -> Measured:
-        """As :meth:`evaluate`, with all measures of all steps."""
+        """Like :meth:`evaluate`, with all measures of all steps."""
         genes, is_one = self._genotypes(genotypes)
         where = address(generation, trials, self.n_trials)
         n_trials = where[4] - where[3]
@@ -233,7 +233,7 @@ class Experiment:
         trials: int | range | None = None,
         threads: int | None = None,
     ) -> Trace:
-        """Everything that there is to see of a genotype ``[d]`` in T trials."""
+        """All recorded values of a genotype ``[d]`` in T trials."""
         genes = self._genotype(genotype)
         where = address(generation, trials, self.n_trials)
         _core.ensure_memory(self._trace_len(where[4] - where[3]), f"a trace of {where[4] - where[3]} trials")
@@ -243,7 +243,7 @@ class Experiment:
     def episodes(
         self, generation: AnyTrialSet = 0, *, trials: int | range | None = None
     ) -> Episodes:
-        """T trials side by side, step by step, whose robots do what they are told."""
+        """T trials side by side, step by step, whose robots the caller controls."""
         where = address(generation, trials, self.n_trials)
         return Episodes(self, where, self._core.episodes(where))
 
@@ -262,13 +262,13 @@ class Experiment:
         params: Mapping[str, Any] | None = None,
         **settings: Any,
     ) -> Experiment:
-        """Another experiment, with these changes.
+        """A copy of the experiment, with these changes.
 
-        ``algorithm``: its class or its name in experiment files, such as ``"CMA-ES"``; parameters of the one before go, and
-        ``params`` has those that shall not be its defaults, for all populations. ``params`` without ``algorithm``
-        changes parameters of the algorithm that the experiment has. ``settings``: any other key of ``algorithm``
-        in the file, such as ``num_evaluations`` or ``evaluation_steps``. Raises :class:`ExperimentError` with all
-        that is wrong.
+        ``algorithm``: its class or its name in experiment files, such as ``"CMA-ES"``; it drops the
+        parameters of the previous algorithm, and ``params`` sets those that differ from the defaults, for all
+        populations. ``params`` without ``algorithm`` changes parameters of the experiment's algorithm.
+        ``settings``: any other key of ``algorithm`` in the file, such as ``num_evaluations`` or
+        ``evaluation_steps``. Raises :class:`ExperimentError` with all mistakes.
 
         >>> experiment = Experiment.quickstart().replace(algorithm="CMA-ES", seed=7, params={"sigma_init": 0.1})
         >>> experiment.to_dict()["algorithm"]["name"], experiment.seed
@@ -297,8 +297,8 @@ class Experiment:
 
     def evolution(self) -> Evolution:
         """The experiment's evolution before its first generation, the same as a
-        coordinator's: the same genotypes for the same fitness, and the same digests. Warns
-        (``EvolutionWarning``) of what :attr:`warnings` has."""
+        coordinator's: the same genotypes for the same fitness, and the same digests. Issues
+        :attr:`warnings` as ``EvolutionWarning``."""
         self._warn(3)
         return self._evolution()
 
@@ -314,11 +314,12 @@ class Experiment:
         return Evolution._of(self._core.evolution(), trials, self._origin)
 
     def fitness(self, genotypes: Genes | Sequence[Champion], trial_set: AnyTrialSet, n_trials: int) -> Floats:
-        """:meth:`evaluate`, in the form that :meth:`Evolution.compare` and :meth:`Evolution.judge` take."""
+        """:meth:`evaluate`, in the form that :meth:`Evolution.compare` and :meth:`Evolution.judge`
+        require."""
         return self.evaluate(genotypes, trial_set, trials=n_trials)
 
     def _trace_len(self, n_trials: int) -> int:
-        """About how many bytes a trace takes while it is made."""
+        """Approximate number of bytes that a trace needs while it is made."""
         topology = self._config["topology"]
         widths = [sum(it["n"] for it in topology[key].values()) for key in ("stimuli", "ensembles")]
         emitters = [
@@ -331,23 +332,23 @@ class Experiment:
         return total
 
     def check(self, champion: Champion) -> None:
-        """Whether a champion was evolved in this experiment: its file (but for its name, ``generations``,
-        ``target_fitness`` and ``judgement_trials``), seed and simulation, by their digest.
-        :class:`OtherExperimentError` if not. Every function that takes a champion does so.
+        """Checks that a champion evolved in this experiment, by the digest of the file (except for its name,
+        ``generations``, ``target_fitness`` and ``judgement_trials``), seed and simulation. Raises
+        :class:`OtherExperimentError` if not. Every function that takes a champion calls it.
 
-        Under other conditions, knowingly, give the champion's ``genotype``, which says nothing of where it is from.
+        To use a champion under other conditions on purpose, give its ``genotype``, which has no origin.
         """
         if not isinstance(champion, Champion):
             raise ValueError(f"a Champion is compared with an experiment, not {type(champion).__name__}")
         origin = champion.origin
         if origin is None:
             raise OtherExperimentError(
-                "the champion does not say in what experiment it was evolved", "Give its `genotype` if it is of this one"
+                "the champion does not say in which experiment it evolved", "Give its `genotype` if it is of this one"
             )
         if origin.config_digest == self.config_digest:
             return
         raise OtherExperimentError(
-            f"the champion was evolved in another experiment: {origin.name or 'one without a name'}"
+            f"the champion evolved in another experiment: {origin.name or 'one without a name'}"
             f"{'' if origin.seed is None else f', seed {origin.seed}'}, configuration {origin.config_digest[:12]}; "
             f"this is {self.name}, seed {self.seed}, configuration {self.config_digest[:12]}",
             self._difference(origin),
@@ -356,12 +357,12 @@ class Experiment:
     def _difference(self, origin: Origin) -> str:
         if origin.simulation not in (None, _core.FINGERPRINT):
             return (
-                f"It was evolved by the simulation `{origin.simulation}`, and this is `{_core.FINGERPRINT}`; "
-                f"give its `genotype` if you want to see what it does in this one"
+                f"It evolved by the simulation `{origin.simulation}`, but this is `{_core.FINGERPRINT}`; "
+                f"give its `genotype` to use it with this one"
             )
         if origin.seed is not None and origin.seed != self.seed and self.replace(seed=origin.seed).config_digest == origin.config_digest:
             return f"Only the seed differs: read this experiment with seed={origin.seed}"
-        return "Read the experiment that it was evolved in, or give its `genotype` to see it under other conditions"
+        return "Read the experiment in which it evolved, or give its `genotype` to use it under other conditions"
 
     def _genotypes(self, genotypes: Genes | Sequence[Champion]) -> tuple[Floats, bool]:
         if isinstance(genotypes, Champion):
@@ -381,14 +382,15 @@ class Experiment:
 
 
 def thread_count(threads: int | None) -> int:
-    """Of a computation: as many as there are processors if absent."""
+    """Number of threads of a computation: that of the processors if absent."""
     if threads is None:
         return available_cpus()
     return arguments.whole(threads, "threads", 1, THREADS_MAX)
 
 
 def config_text(config: Mapping[str, Any]) -> str:
-    """What an experiment file says, as text; arrays and numbers of NumPy are lists and numbers."""
+    """The content of an experiment file as text; converts arrays and numbers of NumPy to lists and
+    numbers."""
     if not isinstance(config, Mapping):
         raise ValueError(f"an experiment is a mapping from keys to values, not {type(config).__name__}")
 
@@ -411,7 +413,7 @@ def parameters_of(algorithm: str) -> list[str]:
 
 
 def as_experiment(given: Experiment | Mapping[str, Any] | str) -> Experiment:
-    """An experiment, from what stands for one: itself, a file's text, or what it says."""
+    """An experiment, from any of its forms: itself, a file's text, or its content."""
     if isinstance(given, Experiment):
         return given
     return Experiment(given) if isinstance(given, str) else Experiment.from_dict(given)

@@ -1,4 +1,4 @@
-"""What of other packages is needed, and how to get it."""
+"""Optional packages, and the commands to install them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ PACKAGES = {
     "plot": ("matplotlib",),
     "steps": ("gymnasium", "pettingzoo"),
 }
-"""Packages that are imported, by the extra that brings them."""
+"""Imported packages, by the extra that installs them."""
 
 
 @contextmanager
 def needs(extra: str) -> Iterator[None]:
-    """Imports packages of an extra; if one is missing, the ModuleNotFoundError says how to install it."""
+    """Imports packages of an extra; if one is missing, the ModuleNotFoundError names the command to
+    install it."""
     try:
         yield
     except ModuleNotFoundError as error:

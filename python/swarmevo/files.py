@@ -17,13 +17,13 @@ from .records import RecordedRun, Records
 
 
 AT_ONCE = 32
-"""Generations whose fitness is read at once."""
+"""Number of generations whose fitness is read at once."""
 
 _left_behind: list[_core.Database] = []
 
 
 def open(directory: str | os.PathLike[str] = "swarm-data") -> Archive:
-    """Opens the data directory of ``swarmctl run`` or of a coordinator. It is only read; a
+    """Opens the data directory of ``swarmctl run`` or of a coordinator. Only reads it; a
     coordinator may use it meanwhile."""
     return Archive(directory)
 
@@ -38,7 +38,7 @@ class Archive(Records):
         self._process = os.getpid()
 
     def to_parquet(self, directory: str | os.PathLike[str]) -> list[Path]:
-        """Writes ``experiments.parquet``, and of each experiment ``history-ID.parquet`` and
+        """Writes ``experiments.parquet``, and for each experiment ``history-ID.parquet`` and
         ``fitness-ID.parquet``: the tables of :meth:`~Records.experiments`,
         :meth:`~RecordedRun.history` and :meth:`~RecordedRun.fitness_log`. Returns the files."""
         with needs("data"):
@@ -63,7 +63,7 @@ class Archive(Records):
             n_wanted = min(sum(1 for _ in wanted), AT_ONCE)
             read = _core.fitness_log(os.fspath(self.directory), experiment, first, n_wanted)
             found = list(itertools.takewhile(lambda it: it is not None, read))
-            # Without it, the answer says why it is not there.
+            # Without the fitness, the answer tells why it is missing.
             fitness += [it for it in found if it is not None] or super()._fitness(experiment, [first])
         return fitness
 
@@ -73,7 +73,7 @@ class Archive(Records):
     def _call(self, name: str, **request: Any) -> Any:
         _, request_class, response_class = protocol.method("ExperimentService", name)
         if self._process != os.getpid():
-            # A database must not be used, nor closed, by a process that was forked from the one that opened it.
+            # A forked process must neither use nor close a database that its parent opened.
             _left_behind.append(self._database)
             self._database, self._process = _core.Database(os.fspath(self.directory)), os.getpid()
         answer = self._database.call(name, request_class(**request).SerializeToString())

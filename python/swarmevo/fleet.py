@@ -31,15 +31,15 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 REQUEST_LEN_MAX = 7 << 20
-"""Bytes of genes in one request; a coordinator takes 8 MiB."""
+"""Bytes of genes in one request; a coordinator accepts 8 MiB."""
 VALUES_MAX = 1 << 21
 """Genotypes times trials in one request."""
 DEADLINE_S = 30.0
 PAUSE_S = 1.0
 SILENCE_MAX_S = 2.0
-"""Nobody waits for workers for longer without a word."""
+"""The longest silent wait for workers."""
 TRANSIENT = ("UNAVAILABLE", "DEADLINE_EXCEEDED", "ABORTED")
-"""Errors after which the same request may succeed; every request can be repeated."""
+"""Transient errors; every request can be repeated."""
 ENDS = ("completed", "failed", "cancelled")
 
 
@@ -54,11 +54,12 @@ def connect(
     plaintext: bool = False,
     patience: float = 60.0,
 ) -> Client:
-    """A client of a coordinator. What is not given is found as ``swarmctl`` finds it: in the
-    environment (``SWARM_COORDINATOR``, ``SWARM_CLIENT_TOKEN``, ``SWARM_TLS_CA``, ...), else in
-    the settings file, else it is ``http://127.0.0.1:7700`` without a token.
+    """A client of a coordinator. Absent arguments come from the same places as for ``swarmctl``:
+    the environment (``SWARM_COORDINATOR``, ``SWARM_CLIENT_TOKEN``, ``SWARM_TLS_CA``, ...), else
+    the settings file, else ``http://127.0.0.1:7700`` without a token.
 
-    ``patience``: for how many seconds requests are repeated while the coordinator is away.
+    ``patience``: the time in seconds for which the client repeats requests while the coordinator
+    is unreachable.
     """
     if coordinator is not None:
         arguments.name_of(coordinator, "coordinator")
@@ -135,9 +136,9 @@ class Client(Records):
         labels: Mapping[str, str] | None = None,
         request_id: str | None = None,
     ) -> FleetRun:
-        """Has the fleet run an experiment: an :class:`Experiment`, a file's text, or what it
-        says. ``name``, ``seed`` and ``generations`` replace the file's. The same ``request_id`` leads to the same
-        experiment. Raises :class:`ExperimentError` with all that is wrong with the file."""
+        """Submits an experiment to the fleet: an :class:`Experiment`, a file's text, or its content.
+        ``name``, ``seed`` and ``generations`` replace the file's. The same ``request_id`` returns the same
+        experiment. Raises :class:`ExperimentError` with all mistakes in the file."""
         arguments.name_of(name, "name")
         if name:
             experiment = as_experiment(experiment).replace(name=name)
@@ -189,12 +190,12 @@ class Client(Records):
         trials: int | None = None,
         priority: int | None = None,
     ) -> Floats:
-        """Fitness ``[P, T]`` of genotypes ``[P, d]`` (or ``[d]``: then ``[T]``), computed by the
-        fleet: the bits of :meth:`Experiment.evaluate`, audited and repeated as a generation of
-        an experiment is. It waits for workers if there are none, which is a :class:`FleetWarning` after two seconds.
+        """Fitness ``[P, T]`` of genotypes ``[P, d]`` (or ``[d]``: then ``[T]``), computed by the fleet: the
+        bits of :meth:`Experiment.evaluate`, with the audits and repetitions of a generation. Without workers
+        it waits, and issues a :class:`FleetWarning` after two seconds.
 
-        ``generation``: whose trials, or a trial set, but for those of evaluations. ``trials``:
-        their number; the file's if absent. ``priority``: share of the fleet, 1 to 1000.
+        ``generation``: the generation of the trials, or a trial set other than that of evaluations.
+        ``trials``: their number; the file's if absent. ``priority``: share of the fleet, 1 to 1000.
         """
         genes, is_one = experiment._genotypes(genotypes)
         n_trials = experiment.n_trials if trials is None else arguments.whole(trials, "trials", 1, TRIALS_MAX)
@@ -234,7 +235,7 @@ class Client(Records):
         return stub(path, request_class.SerializeToString, response_class.FromString), request_class
 
     def _request(self, service: str, name: str, **request: Any) -> Any:
-        """One answer to one request, repeated while the coordinator is away."""
+        """The answer to one request, repeated while the coordinator is unreachable."""
         call, request_class = self._call_of(service, name)
         message = request_class(**request)
         return self._patiently(
@@ -242,7 +243,7 @@ class Client(Records):
         )
 
     def _all_at_once(self, service: str, name: str, requests: list[dict[str, Any]]) -> list[Any]:
-        """Answers to requests that may take any time, sent together."""
+        """Answers to requests without a time limit, sent together."""
         call, request_class = self._call_of(service, name)
         messages = [request_class(**request) for request in requests]
         waiting = [call.future(it, metadata=self._metadata) for it in messages]
@@ -261,12 +262,12 @@ class Client(Records):
                 answers.append(self._patiently(answer))
             return answers
         finally:
-            # Whoever stops waiting, stops the work.
+            # A caller that stops waiting cancels the work.
             for future in waiting:
                 future.cancel()
 
     def _aloud(self, future: Any) -> Any:
-        """What a call has come to; warns if it waits for workers."""
+        """The result of a call; warns if it waits for workers."""
         import grpc
 
         try:
@@ -279,7 +280,7 @@ class Client(Records):
         try:
             has_workers = bool(self._request("FleetService", "ListWorkers").workers)
         except FleetError:
-            # Whoever waits hears of that by itself.
+            # The waiting caller gets this error itself.
             return
         if not has_workers:
             warnings.warn(
@@ -310,8 +311,8 @@ class FleetRun(RecordedRun):
     _records: Client
 
     def watch(self) -> Iterator[Generation]:
-        """All generations, each once, those that are done first, until the experiment has ended; through restarts of
-        the coordinator. That there are no workers is a :class:`FleetWarning`."""
+        """All generations, each once, beginning with completed ones, until the experiment has ended, even if
+        the coordinator restarts. Issues a :class:`FleetWarning` if there are no workers."""
         self._warn_if_it_waits(4)
         yield from self._watched()
 
@@ -347,8 +348,8 @@ class FleetRun(RecordedRun):
                 self.refresh()
 
     def wait(self, *, progress: bool = True) -> FleetRun:
-        """Waits for its end. ``progress``: whether tqdm, if it is installed, shows how far it
-        is. Raises :class:`FleetError` if it fails or is cancelled."""
+        """Waits for its end. ``progress``: whether tqdm, if installed, shows the progress. Raises
+        :class:`FleetError` if the experiment fails or is cancelled."""
         self._warn_if_it_waits(4)
         for _ in shown(self._watched(), self.name, progress, total=self.message.generations):
             pass
@@ -358,12 +359,12 @@ class FleetRun(RecordedRun):
         return self
 
     def pause(self, reason: str = "") -> None:
-        """Takes it from the workers until it is resumed. FleetError if it has ended."""
+        """Pauses the experiment until it is resumed. FleetError if it has ended."""
         self._records._call("PauseExperiment", experiment_id=self.id, reason=reason)
 
     def resume(self, generations: int | None = None) -> None:
-        """Lets it go on, when it is paused, has failed or was cancelled; or, when it has completed,
-        to ``generations`` in all."""
+        """Resumes a paused, failed or cancelled experiment; or extends a completed one to
+        ``generations`` in total."""
         if generations is None:
             self._records._call("ResumeExperiment", experiment_id=self.id)
         else:
@@ -374,12 +375,12 @@ class FleetRun(RecordedRun):
         self._records._call("CancelExperiment", experiment_id=self.id)
 
     def extend(self, generations: int) -> None:
-        """As ``resume(generations)``, under the name of earlier releases."""
+        """The name of ``resume(generations)`` in earlier releases."""
         generations = arguments.whole(generations, "generations", 1)
         self._records._call("ExtendExperiment", experiment_id=self.id, generations=generations)
 
     def set_priority(self, priority: int) -> None:
-        """Its share of the fleet beside other experiments, 1 to 1000."""
+        """Sets its share of the fleet relative to other experiments, 1 to 1000."""
         self._records._call("SetPriority", experiment_id=self.id, priority=_priority(priority))
 
 

@@ -1,4 +1,5 @@
-"""Generations in short: one type, for runs here, of a fleet and of data directories."""
+"""Summaries of generations: one type for runs of this process, of a fleet and of data
+directories."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Generation:
-    """The fitness of a generation in short, over the individuals whose fitness is finite."""
+    """The summary of a generation, over the individuals whose fitness is finite."""
 
     index: int
     """From 0."""
@@ -20,26 +21,26 @@ class Generation:
     mean: float
     min: float
     n_non_finite: int | None = field(compare=False)
-    """Individuals whose fitness is not finite; they rank last. None where that is not recorded."""
+    """Number of individuals whose fitness is not finite; they rank last. None if not recorded."""
     digest: str
-    """A link of a hash chain over all genotypes and fitness so far: equal digests, equal
-    runs, bit for bit."""
+    """A link of a hash chain over all genotypes and fitness so far: equal digests mean equal runs,
+    bit for bit."""
     standard_deviation: float | None = None
-    """Over the population."""
+    """Standard deviation over the population."""
     duration_ms: int | None = field(default=None, compare=False)
     """Wall-clock time, if it was measured."""
     episodes: int | None = field(default=None, compare=False)
     """Episodes simulated."""
     workers: int | None = field(default=None, compare=False)
-    """Workers at its end; threads, of a run here."""
+    """Number of workers at its end; of threads, for a run of this process."""
     idle_share: float | None = field(default=None, compare=False)
-    """Share of the fleet's time that was not spent computing."""
+    """Share of the fleet's time without computing."""
     completed_at_ms: int | None = field(default=None, compare=False)
     """Milliseconds since 1970 UTC."""
 
     @property
     def generation(self) -> int:
-        """The name that ``index`` had in what :meth:`FleetRun.watch` gave."""
+        """The earlier name of ``index`` in results of :meth:`FleetRun.watch`."""
         warnings.warn("`generation` of a Generation is now `index`", DeprecationWarning, stacklevel=2)
         return self.index
 
@@ -51,7 +52,7 @@ class Generation:
 
 
 def of_message(summary: Any, completed_at_ms: int | None = None) -> Generation:
-    """What a message ``GenerationSummary`` says."""
+    """A generation from a message ``GenerationSummary``."""
     return Generation(
         summary.generation, summary.best, summary.mean, summary.min, None, summary.digest, summary.standard_deviation,
         summary.duration_ms, summary.episodes, summary.workers, summary.idle_share, completed_at_ms,
@@ -59,7 +60,7 @@ def of_message(summary: Any, completed_at_ms: int | None = None) -> Generation:
 
 
 class Generations(list[Generation]):
-    """A list. It can still be called, as when ``generations`` was a method of recorded runs."""
+    """A list that can still be called, because ``generations`` was a method of recorded runs."""
 
     def __init__(self, generations: Sequence[Generation], messages: Callable[[], Iterator[Any]]) -> None:
         super().__init__(generations)

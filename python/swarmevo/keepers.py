@@ -1,4 +1,4 @@
-"""Where a run keeps its generations: nowhere, in the database of a data directory, or in a file."""
+"""Storage for the generations of a run: none, the database of a data directory, or a file."""
 
 from __future__ import annotations
 
@@ -27,34 +27,34 @@ except ImportError:  # elsewhere than on Unix
 Floats = NDArray[np.float64]
 
 WRITE_EVERY_S = 1.0
-"""A file is written again after so long, and at the end."""
+"""The interval between writes of a file, which is also written at the end."""
 FORMAT = 1
 
 
 class End(NamedTuple):
-    """Of a run that has completed."""
+    """The stored end of a completed run."""
 
     champion: Champion
     digest: str
 
 
 class Done(NamedTuple):
-    """A generation that is complete."""
+    """A complete generation."""
 
     generation: Generation
     evolution: Evolution
     """After it."""
     fitness: Floats
     blocks: list[Floats]
-    """Fitness of the blocks of the comparison that was due; none if it was not."""
+    """Fitness of the blocks of a scheduled comparison, if any."""
     judgement: Judgement | None
-    """If it was the last one."""
+    """The end of the run, after the last generation."""
     notices: list[str]
-    """What is worth a word."""
+    """Notices."""
     seconds: float
     n_workers: int
     completed: str | None
-    """If it was the last one, why; empty: all are done."""
+    """The reason, if it was the last generation; empty: all are done."""
 
 
 class Keeper:
@@ -63,11 +63,11 @@ class Keeper:
     id: int | None = None
     """The number of the experiment, if it has one."""
     end: End | None = None
-    """If the run has completed before."""
+    """The end, if the run was complete before."""
 
     def __init__(self, experiment: Experiment) -> None:
         self.evolution: Evolution = experiment._evolution()
-        """After the generations that are done."""
+        """The evolution after the stored generations."""
         self.generations: list[Generation] = []
         """Those."""
 
@@ -75,14 +75,14 @@ class Keeper:
         """Keeps a generation."""
 
     def fail(self, reason: str) -> None:
-        """Keeps that the next generation cannot be learnt from."""
+        """Stores the failure: evolution cannot learn from the next generation."""
 
     def close(self) -> None:
-        """Keeps what is to be kept, and lets others use it."""
+        """Writes pending data, and releases the storage for others."""
 
 
 class InDatabase(Keeper):
-    """In the database of a data directory, as ``swarmctl run`` does."""
+    """Storage in the database of a data directory, like ``swarmctl run``."""
 
     def __init__(self, experiment: Experiment, directory: str) -> None:
         self._record = _core.Record(directory, experiment._core)
@@ -123,8 +123,8 @@ class InDatabase(Keeper):
 
 
 class InFile(Keeper):
-    """In a file of a data directory: runs whose fitness is not the experiment's own, which no coordinator and no
-    ``swarmctl`` could go on with."""
+    """Storage in a file of a data directory, for runs with a fitness function of the caller: neither a
+    coordinator nor ``swarmctl`` could continue them."""
 
     def __init__(self, experiment: Experiment, directory: str) -> None:
         super().__init__(experiment)
@@ -148,16 +148,16 @@ class InFile(Keeper):
         try:
             found = json.loads(self.path.read_text(encoding="utf-8"))
             if found["format"] != FORMAT or found["config_digest"] != self._experiment.config_digest:
-                raise ValueError("it has another format, or is of another experiment")
+                raise ValueError("it has another format, or belongs to another experiment")
             generations = [Generation(**it) for it in found["generations"]]
             state = _core.Evolution.from_json(found["evolution"], _n_flat(generations, self._experiment.population_size))
             if state.n_generations != len(generations) or (generations and state.digest != generations[-1].digest):
-                raise ValueError("its generations are not those of its evolution")
+                raise ValueError("its generations do not match its evolution")
             end = None if found["end"] is None else _end_of(found["end"], self._experiment)
         except (ValueError, KeyError, TypeError) as error:
-            raise ValueError(f"{self.path} is no run to go on with: {error}; move it elsewhere to begin anew") from None
+            raise ValueError(f"{self.path} is no run to continue: {error}; move it elsewhere to start again") from None
         if found.get("failed") is not None:
-            raise EvolutionError(f"{found['failed']}; the run in {self.path} has ended so: move the file elsewhere to begin anew")
+            raise EvolutionError(f"{found['failed']}; the run in {self.path} failed: move the file elsewhere to start again")
         self.evolution = Evolution._of(state, self.evolution._trials, self.evolution._origin)
         self.generations = generations
         if end is not None and len(generations) >= self._experiment.generations:
@@ -173,7 +173,7 @@ class InFile(Keeper):
             self._write()
 
     def fail(self, reason: str) -> None:
-        # Where no generation is kept, there is nothing that another beginning would lose.
+        # Without a stored generation, a restart loses nothing.
         if self.generations:
             self._failed, self._is_new = reason, True
 
@@ -185,7 +185,7 @@ class InFile(Keeper):
             self._lock.close()
 
     def _write(self) -> None:
-        """The file is always whole: another one takes its place."""
+        """Writes a new file, then replaces the old one, so that the file is always complete."""
         content = {
             "format": FORMAT,
             "config_digest": self._experiment.config_digest,
@@ -205,7 +205,7 @@ class InFile(Keeper):
 
 
 def _n_flat(generations: list[Generation], population_size: int) -> int:
-    """In how many of the latest generations all individuals had the same fitness."""
+    """The number of latest generations in which all individuals had the same fitness."""
     if population_size < 2:
         return 0
     same = itertools.takewhile(lambda it: it.n_non_finite == 0 and it.best == it.min, reversed(generations))
@@ -213,7 +213,8 @@ def _n_flat(generations: list[Generation], population_size: int) -> int:
 
 
 def _lock(path: Path) -> IO[str]:
-    """The open file that keeps other runs of the same experiment out of the directory, where the system can."""
+    """The lock file that keeps other runs of the same experiment out of the directory, if the system supports
+    it."""
     file = path.open("w")
     if fcntl is not None:
         try:

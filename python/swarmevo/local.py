@@ -1,4 +1,4 @@
-"""Whole runs, here: what a coordinator does, to the same bits."""
+"""Whole runs in this process, with the same bits as a coordinator's."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Callback = Callable[[Generation, Evolution], Any]
-"""Called with every generation that is complete, and with a copy of evolution after it."""
+"""Called with every complete generation, and with a copy of the evolution after it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,13 +34,13 @@ class LocalRun:
 
     experiment: Experiment
     generations: list[Generation]
-    """All that are complete, in order."""
+    """All complete generations, in order."""
     champion: Champion
-    """Judged on trials that selected nothing, unless the run was interrupted."""
+    """The champion, judged on trials that selected nothing, unless the run was interrupted."""
     digest: str
-    """Covers every bit of the run: the one that ``swarmctl run`` prints."""
+    """Digest of every bit of the run, the same as ``swarmctl run`` prints."""
     evolution: Evolution
-    """After the last generation, to go on from."""
+    """The evolution after the last generation, from which a run can continue."""
     id: int | None = None
     """Its number in the data directory, if it has one."""
 
@@ -63,7 +63,7 @@ class LocalRun:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C has ended :func:`evolve`. ``run`` has everything until then: the generations that are complete,
+    """Ctrl-C has ended :func:`evolve`. ``run`` has everything until then: the complete generations,
     ``evolution`` after them, and the champion so far, which is not judged."""
 
     def __init__(self, run: LocalRun, advice: str) -> None:
@@ -88,31 +88,33 @@ def evolve(
     """Runs an experiment here, as ``swarmctl run`` does: the same generations, champion and
     digest.
 
-    ``generations``: instead of the file's. ``threads``: as many as there are processors if
-    absent. ``progress``: whether tqdm, if it is installed, shows how far it is.
+    ``generations``: their number, instead of the file's. ``threads``: their number, that of the processors if
+    absent. ``progress``: whether tqdm, if installed, shows the progress.
 
-    ``data_dir``: the data directory that keeps every generation, as that of ``swarmctl run`` does. The same call goes
-    on with what was interrupted, and gives what has completed without computing it again; ``swarmctl list
-    --data-dir``, ``swarmevo.open`` and ``swarmctl run`` know the run. Nobody else uses the directory meanwhile.
+    ``data_dir``: a data directory that stores every generation, like that of ``swarmctl run``. The same call
+    continues an interrupted run, and returns a completed one without computing it again; ``swarmctl list
+    --data-dir``, ``swarmevo.open`` and ``swarmctl run`` know the run. No other program can use the directory
+    meanwhile.
 
-    ``callback``: called with every :class:`Generation` that is complete (and kept), and with a copy of evolution
-    after it. What it raises ends the run, unchanged.
+    ``callback``: called with every complete (and stored) :class:`Generation`, and with a copy of the
+    evolution after it. Its exceptions end the run, unchanged.
 
-    Warnings of the experiment, and what a coordinator would have as notices because evolution learns nothing, are an
-    ``EvolutionWarning``. Where a coordinator's run fails for that reason, this one ends with the same words in an
-    ``EvolutionError``, a ValueError; ``data_dir`` keeps the generations before. Its database has the failure, too,
-    and the same call begins another run there, as ``swarmctl run`` does; a file of ``evaluate`` has it with the
-    generations, and the same call raises it again at once.
+    Warnings of the experiment, and a coordinator's notices that evolution learns nothing, are an
+    ``EvolutionWarning``. Where a coordinator's run fails for that reason, this one raises an
+    ``EvolutionError``, a ValueError, with the same message; ``data_dir`` keeps the earlier generations. Its
+    database also stores the failure, and the same call then starts another run, like ``swarmctl run``; a file
+    of ``evaluate`` stores it with the generations, and the same call raises it again at once.
 
-    Ctrl-C raises :class:`Interrupted`, a KeyboardInterrupt whose ``run`` has all that is complete; within a second
-    where the experiment itself computes fitness.
+    Ctrl-C raises :class:`Interrupted`, a KeyboardInterrupt whose ``run`` has all complete generations; within
+    a second if the experiment itself computes fitness.
 
     ``evaluate``: computes fitness instead of the experiment's own :meth:`~Experiment.evaluate`:
     ``f(genotypes, trial_set, n_trials)`` returns an array ``[P, T]`` of T = ``n_trials``, of any type of numbers
     (NumPy, JAX, PyTorch, lists, tuples), or ``[P]`` if trials do not matter, which counts as one trial. Anything
-    else is a ValueError at once. A fitness that is not finite ranks last. What ``evaluate`` raises ends the run,
-    unchanged. ``data_dir`` keeps such a run in a file of its own, ``NAME-DIGEST.evolve.json``: no coordinator could
-    go on with it. It is for one function: another one, which may be the same with changes, needs another directory.
+    else is a ValueError at once. A fitness that is not finite ranks last. Exceptions of ``evaluate`` end the
+    run, unchanged. ``data_dir`` stores such a run in its own file, ``NAME-DIGEST.evolve.json``, because no
+    coordinator could continue it. The file belongs to one function: another or a changed function needs
+    another directory.
     """
     if not isinstance(experiment, Experiment):
         raise ValueError(f"evolve takes an Experiment, such as Experiment.from_file gives, not {type(experiment).__name__}")
@@ -140,13 +142,14 @@ def evolve(
         except KeyboardInterrupt:
             if not run.done:
                 raise
-            lost = "`run` of this exception has them" if data_dir is None else f"the same call goes on, from {data_dir}"
+            lost = "`run` of this exception has them" if data_dir is None else f"the same call continues from {data_dir}"
             raise Interrupted(run.so_far(), lost) from None
         return run.ended()
 
 
 class _Run:
-    """A run, generation by generation. It has whole ones only, whatever is raised meanwhile."""
+    """A run, generation by generation. It contains only complete generations, even after an
+    exception."""
 
     def __init__(
         self, experiment: Experiment, keeper: Keeper, evaluate: Evaluate, callback: Callback | None, n_threads: int
@@ -157,10 +160,10 @@ class _Run:
         self._evolution, self.done = keeper.evolution, list(keeper.generations)
         self._end = keeper.end
         self.notices: list[str] = []
-        """Of the latest generation."""
+        """Digest of the latest generation."""
 
     def step(self) -> bool:
-        """One generation, unless the run is over; whether there was one."""
+        """Computes one generation, unless the run is over; returns whether it did."""
         if self._end is not None:
             return False
         started = time.monotonic()
@@ -188,7 +191,7 @@ class _Run:
         return True
 
     def so_far(self) -> LocalRun:
-        """What is complete."""
+        """The complete part of the run."""
         if self._end is not None:
             return self.ended()
         champion = self._evolution.champion
@@ -197,7 +200,7 @@ class _Run:
         return LocalRun(self._experiment, self.done, champion, digest, self._evolution, self._keeper.id)
 
     def ended(self) -> LocalRun:
-        """The whole of it."""
+        """The whole run."""
         assert self._end is not None, "the run is over"
         champion, digest = self._end
         return LocalRun(self._experiment, self.done, champion, digest, self._evolution, self._keeper.id)

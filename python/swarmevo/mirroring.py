@@ -11,9 +11,9 @@ from . import arguments
 
 
 def mirror(x: ArrayLike) -> NDArray[np.float64]:
-    """``x`` in [0, 1], by reflection at both ends: what the algorithms here do with what
-    they draw. Some optimisers are slow with bounds, or hang; give them none, and mirror what
-    they ask for.
+    """Maps ``x`` to [0, 1] by reflection at both ends, as the algorithms here do with their
+    samples. Some optimisers are slow with bounds, or hang: give them none, and mirror their
+    samples.
 
     >>> mirror([-0.25, 0.5, 1.25, 2.5]).tolist()
     [0.25, 0.5, 0.75, 0.5]

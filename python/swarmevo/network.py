@@ -1,4 +1,4 @@
-"""Networks: what a genotype encodes."""
+"""Networks, which genotypes encode."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Network:
 
     def __init__(self, description: dict[str, Any]) -> None:
         self.description: dict[str, Any] = description
-        """All of it, as ``swarmctl champion --output json`` has it."""
+        """The whole network, as in ``swarmctl champion --output json``."""
         neurons = description["neurons"]
         self.inputs: list[str] = [
             f"{it['name']}_{i}" for it in description["stimuli"] for i in range(it["n"])
@@ -42,9 +42,9 @@ class Network:
         }
         """By name, such as ``tau``, ``bias`` and ``gain`` of ``ctrnn``: ``[N]``."""
         self.input_weights: NDArray[np.float64] = np.zeros((len(neurons), len(self.inputs)))
-        """``[N, I]``: weight of each synapse from an input, 0 where there is none."""
+        """``[N, I]``: weight of each synapse from an input, 0 without a synapse."""
         self.weights: NDArray[np.float64] = np.zeros((len(neurons), len(neurons)))
-        """``[N, N]``: ``weights[post, pre]``, 0 where there is no synapse."""
+        """``[N, N]``: ``weights[post, pre]``, 0 without a synapse."""
         self.nodes: list[str] = [
             f"{it['name']}_node_{i}"
             for it in description["stimuli"]

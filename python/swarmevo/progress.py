@@ -1,4 +1,4 @@
-"""How far something is."""
+"""Progress bars."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Item = TypeVar("Item")
 def shown(
     items: Iterable[Item], name: str, progress: bool, total: int | None = None, initial: int = 0
 ) -> Iterator[Item]:
-    """``items``; tqdm, if it is installed and wanted, shows how many of them are done."""
+    """Iterates over ``items``; tqdm, if installed and requested, shows the progress."""
     if progress:
         try:
             from tqdm.auto import tqdm

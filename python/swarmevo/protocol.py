@@ -1,6 +1,6 @@
 """The gRPC protocol, from its published descriptor: no generated code.
 
-``docs/clients.md`` and ``proto/swarm/v1`` of the project say what messages mean.
+``docs/clients.md`` and ``proto/swarm/v1`` of the project describe the messages.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Experiments that a coordinator has, or its database: histories, champions, individuals."""
+"""Experiments of a coordinator or of its database: histories, champions, individuals."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Individuals:
-    """A generation, as evolution was told of it."""
+    """A generation, with the fitness that evolution used."""
 
     genotypes: Floats
     """``[P, d]``"""
     fitness: Floats
-    """``[P, T]``: of each in each trial."""
+    """``[P, T]``: of each individual in each trial."""
 
     __repr__ = short
 
 
 class Records(ABC):
-    """Where experiments are read."""
+    """A source of experiments."""
 
     @abstractmethod
     def _call(self, name: str, **request: Any) -> Any:
         """A call of ``ExperimentService``."""
 
     def _fitness(self, experiment: int, generations: Sequence[int]) -> list[Floats]:
-        """``[P, T]``: of each of these generations."""
+        """The fitness ``[P, T]`` of each of these generations."""
         return [self._run(experiment)._individuals(it, fitness_only=True).fitness for it in generations]
 
     def experiments(self) -> pandas.DataFrame:
@@ -60,8 +60,8 @@ class Records(ABC):
         return [self._run(it.id) for it in sorted(found, key=lambda it: it.id)]
 
     def run(self, experiment: int | str) -> RecordedRun:
-        """The experiment of a number, or the one of a name. KeyError if there is none, or
-        several of that name."""
+        """The experiment with a number or a name. KeyError if it does not exist, or the name is
+        ambiguous."""
         if not isinstance(experiment, str):
             run = self._run(arguments.whole(experiment, "an experiment is a name, or a number: it", 1))
             run.refresh()
@@ -74,7 +74,7 @@ class Records(ABC):
         return self._run(found[0])
 
     def individual(self, address: str | int) -> Champion:
-        """Whoever is at an address, bit for bit: ``3`` is the champion of experiment 3,
+        """The genotype at an address, bit for bit: ``3`` is the champion of experiment 3,
         ``3@5/7`` individual 7 of its generation 5, ``3@5/mean`` the mean of the distribution
         after that."""
         if not isinstance(address, str):
@@ -91,7 +91,7 @@ class Records(ABC):
 
 
 class RecordedRun:
-    """An experiment that a coordinator has, or its database."""
+    """An experiment of a coordinator or of its database."""
 
     def __init__(self, records: Records, experiment_id: int) -> None:
         self._records = records
@@ -101,11 +101,11 @@ class RecordedRun:
         self._experiment: Experiment | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        # Messages are read again.
+        # Messages are not copied but read again.
         return self.__dict__ | {"_latest": None}
 
     def refresh(self) -> None:
-        """Reads where it stands."""
+        """Reads its present state."""
         self._latest = self._records._call("GetExperiment", experiment_id=self.id)
 
     @property
@@ -123,27 +123,28 @@ class RecordedRun:
 
     @property
     def state(self) -> str:
-        """``running``, ``completed``, ``failed``, ``cancelled`` or ``paused``, now."""
+        """Its present state: ``running``, ``completed``, ``failed``, ``cancelled`` or
+        ``paused``."""
         self.refresh()
         return protocol.states()[self.message.state]
 
     @property
     def digest(self) -> str:
-        """Covers every bit of it so far; asks for the latest."""
+        """Digest of every bit so far; requests the latest one."""
         self.refresh()
         digest: str = self.message.digest
         return digest
 
     @property
     def experiment(self) -> Experiment:
-        """What is simulated, with its seed."""
+        """The simulated experiment, with its seed."""
         if self._experiment is None:
             message = self.message
             self._experiment = Experiment(self._latest.config_json, message.name, message.seed)
         return self._experiment
 
     def summary(self) -> dict[str, Any]:
-        """Where it stands, in short."""
+        """A short summary of its state."""
         self.refresh()
         it = self.message
         return {
@@ -161,7 +162,7 @@ class RecordedRun:
 
     @property
     def generations(self) -> list[Generation]:
-        """All generations that are done, in order; asks for the latest."""
+        """All complete generations, in order; requests the latest ones."""
         done = [of_message(it.summary, it.completed_at_ms) for it in self._completed()]
         return Generations(done, self._completed)
 
@@ -196,7 +197,7 @@ class RecordedRun:
         return self._records.individual(f"{self.id}@{generation}/mean").genotype
 
     def individuals(self, generation: int) -> Individuals:
-        """All individuals of a generation, with what evolution was told of them."""
+        """All individuals of a generation, with the fitness that evolution used."""
         return self._individuals(arguments.whole(generation, "generation"), fitness_only=False)
 
     def _individuals(self, generation: int, *, fitness_only: bool) -> Individuals:
@@ -217,13 +218,13 @@ class RecordedRun:
         return Individuals(np.array(genotypes), np.array(fitness))
 
     def fitness(self, generation: int) -> Floats:
-        """``[P, T]``: of a generation, as evolution was told of it, without its genotypes."""
+        """``[P, T]``: the fitness of a generation that evolution used, without its genotypes."""
         generation = arguments.whole(generation, "generation")
         return self._records._fitness(self.id, [generation])[0]
 
     def fitness_log(self, generations: range | Iterable[int] | None = None) -> pandas.DataFrame:
-        """A row per generation, individual and trial: what evolution was told. All
-        generations that are done, unless some are named."""
+        """The fitness that evolution used: a row per generation, individual and trial. All
+        complete generations, unless some are named."""
         with needs("data"):
             import pandas
 
@@ -258,7 +259,7 @@ class RecordedRun:
 
 
 def champion_of(message: Any) -> Champion:
-    """What a message says of a genotype."""
+    """A genotype from a message."""
     judged = message.judged if message.HasField("judged") else None
     held_out = message.held_out if message.HasField("held_out") else None
     return Champion(

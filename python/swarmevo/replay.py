@@ -11,9 +11,9 @@ class Replay:
     """An episode with the player. Notebooks display it."""
 
     html: str
-    """A whole page, which loads nothing from elsewhere."""
+    """A whole page, which loads nothing from other servers."""
     height: int = 800
-    """Of the frame in a notebook, in pixels."""
+    """Height of the frame in a notebook, in pixels."""
 
     def _repr_html_(self) -> str:
         page = html_module.escape(self.html, quote=True)

@@ -1,6 +1,7 @@
-"""How to reach the coordinator: as ``swarmctl`` finds out.
+"""The connection to the coordinator, found like that of ``swarmctl``.
 
-Arguments, else the environment, else the settings file, else the default address.
+Settings come from arguments, else the environment, else the settings file, else the default
+address.
 """
 
 from __future__ import annotations
@@ -17,16 +18,17 @@ FILE_VARIABLE = "SWARM_CONFIG"
 
 @dataclass(frozen=True)
 class Settings:
-    """Address of a coordinator and credentials, as far as they are set."""
+    """Address of a coordinator and credentials, if set."""
 
     coordinator: str | None = None
     """``http://`` or ``https://``, host and port."""
     token_file: str | None = None
     """File with the token."""
     tls_ca: str | None = None
-    """PEM file of the authorities that the coordinator's certificate is checked against."""
+    """PEM file of the certificate authorities that must have signed the coordinator's
+    certificate."""
     tls_cert: str | None = None
-    """PEM file of a certificate of one's own."""
+    """PEM file of the client's own certificate."""
     tls_key: str | None = None
     """PEM file of its key."""
     tls_domain: str | None = None
@@ -40,7 +42,7 @@ class Settings:
         environment = cls._of_environment()
         named = given.coordinator
         if named is not None and environment.coordinator not in (None, named):
-            # Credentials for one coordinator are not shown to another.
+            # Credentials for one coordinator must not reach another.
             environment = cls()
         settings = given._or(environment)
         file = cls._of_file()

@@ -1,4 +1,4 @@
-"""The class behind :func:`swarmevo.parallel_env`; it needs PettingZoo, and is imported when it is asked for."""
+"""The class behind :func:`swarmevo.parallel_env`; it needs PettingZoo, so it is imported on demand."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .experiment import Experiment
 from .trials import TrialSet
 
 GENERATIONS_MAX = 10_000_000
-"""Trial sets that seeds choose from."""
+"""Number of trial sets from which seeds choose."""
 
 
 class SwarmEnv(ParallelEnv[str, NDArray[np.float32], dict[str, Any]]):  # type: ignore[misc]
-    """An experiment as an environment; use :func:`swarmevo.parallel_env`. Copies and pickles go on from the step
-    at which they were made, to the same bits."""
+    """An experiment as an environment; use :func:`swarmevo.parallel_env`. Copies and pickles continue from
+    their step, to the same bits."""
 
     render_mode = None
 
@@ -62,7 +62,7 @@ class SwarmEnv(ParallelEnv[str, NDArray[np.float32], dict[str, Any]]):  # type: 
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
-        """A dictionary with what the robot has."""
+        """A dictionary with the robot's actuators."""
         return self.action_spaces[agent]
 
     def reset(
@@ -142,7 +142,7 @@ class SwarmEnv(ParallelEnv[str, NDArray[np.float32], dict[str, Any]]):  # type: 
         return copied
 
     def render(self) -> None:
-        """Nothing; :meth:`Trace.show` plays what a network does."""
+        """Does nothing; :meth:`Trace.show` plays the behaviour of a network."""
 
     def close(self) -> None:
         """Ends the episode."""
@@ -153,7 +153,7 @@ class SwarmEnv(ParallelEnv[str, NDArray[np.float32], dict[str, Any]]):  # type: 
 
 
 def _scalar(value: Any) -> Any:
-    """A whole number that libraries wrap in an array of one, or that is a truth value."""
+    """A whole number that may be a truth value, or wrapped in an array of one element."""
     if isinstance(value, (bool, np.bool_)):
         return int(value)
     return value.reshape(())[()] if isinstance(value, np.ndarray) and value.size == 1 else value

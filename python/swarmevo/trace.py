@@ -1,4 +1,4 @@
-"""Traces: everything that there is to see in episodes."""
+"""Traces: all recorded values of episodes."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ Bools = NDArray[np.bool_]
 class Trace:
     """T episodes of a genotype, step by step, for R robots.
 
-    All arrays are those that the simulator has written. Robots are numbered in the order of
+    All arrays come directly from the simulator. Robots are numbered in the order of
     the objects of the experiment file; lengths are centimetres, angles radians.
     """
 
     fitness: Floats
     """``[T]``: the same bits as :meth:`Experiment.evaluate` gives."""
     step_fitness: Floats
-    """``[T, steps]``; NaN where a step does not count."""
+    """``[T, steps]``; NaN if a step does not count."""
     positions: Floats
     """``[T, steps, R, 2]``: x and y at the end of the step, cm."""
     headings: Floats
@@ -51,11 +51,11 @@ class Trace:
     messages: Floats
     """``[T, steps, R, M]``: its own message, as quantised to a symbol."""
     frame_emitters: Ints
-    """``[T, steps, R]``: the robot from which it took a frame from the air; -1 none."""
+    """``[T, steps, R]``: the robot that emitted the received frame; -1 without a frame."""
     frame_originators: Ints
     """``[T, steps, R]``: the robot whose message the frame carries; -1 without a frame."""
     frame_hops: Counts
-    """``[T, steps, R]``: emissions of the message until then, from 1; 0 without a frame."""
+    """``[T, steps, R]``: number of emissions of the message so far, from 1; 0 without a frame."""
     frame_sectors: Ints
     """``[T, steps, R]``: the sector that received the frame; -1 without one."""
     frame_signals: Floats
@@ -63,13 +63,14 @@ class Trace:
     frame_messages: Floats
     """``[T, steps, R, M]``: the message of the frame; zeros without one."""
     targets: NDArray[np.int8]
-    """``[T, steps, R]``: whether the LED should be on; -1 where the task does not say."""
+    """``[T, steps, R]``: whether the LED should be on; -1 if the task has no target."""
     stimuli: Floats32
-    """``[T, steps, R, I]``: what its controller got; NaN for inputs that it has not."""
+    """``[T, steps, R, I]``: inputs of its controller; NaN for inputs that it lacks."""
     activities: Floats32
     """``[T, steps, R, N]``: activity of its neurons after the step; NaN without a network."""
     voltages: Floats32
-    """``[T, steps, R, N]``: voltage of spiking neurons after the step, mV; N is 0 without."""
+    """``[T, steps, R, N]``: voltage of spiking neurons after the step, mV; N is 0 without such
+    neurons."""
     lights: Floats
     """``[T, steps, L, 2]``: positions of lights during the step, cm."""
     areas: Floats
@@ -83,14 +84,14 @@ class Trace:
         arrays: dict[str, NDArray[Any]],
     ) -> None:
         self.experiment = experiment
-        """What was simulated."""
+        """The simulated experiment."""
         self.genotype = genotype
         """``[d]``: by whom."""
         self._where = where
         measures = arrays.pop("measures")
         names = experiment.measure_names
         self.measures: dict[str, Floats] = {name: measures[..., i] for i, name in enumerate(names)}
-        """By name, ``[T, steps]``; NaN where a step has none."""
+        """Measures by name, ``[T, steps]``; NaN for steps without a value."""
         for name, array in arrays.items():
             setattr(self, name, array)
 
@@ -111,7 +112,7 @@ class Trace:
 
     @property
     def objects(self) -> list[str]:
-        """``[R]``: of which object of the experiment file each robot is."""
+        """``[R]``: the object of each robot in the experiment file."""
         objects = self.experiment.to_dict()["world"]["objects"].items()
         robots = [(name, it) for name, it in objects if it["type"] == "robot"]
         return [name for name, it in robots for _ in range(it["num_instances"])]
@@ -196,8 +197,8 @@ class Trace:
         return polars.DataFrame(columns)
 
     def show(self, trial: int | None = None, *, height: int = 800) -> Replay:
-        """The player with one of the trials, for a notebook; the first if none is named.
-        It needs no network. ``height``: of the frame, in pixels."""
+        """The player with one of the trials, the first if absent, for a notebook. It needs no
+        network. ``height``: of the frame, in pixels."""
         trial = self.trials.start if trial is None else arguments.whole(trial, "trial", 0, TRIALS_MAX - 1)
         height = arguments.whole(height, "height", 1, 100_000)
         if trial not in self.trials:

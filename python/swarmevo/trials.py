@@ -1,7 +1,7 @@
-"""Which trials an experiment is simulated in.
+"""The trials in which an experiment is simulated.
 
-A *trial set* is a family of worlds and noise; its trials are numbered from 0. Evolution is
-selected by one set per generation. Champions are compared, and in the end judged, on others.
+A *trial set* is a family of worlds and noise; its trials are numbered from 0. Each generation has
+its own set, which selects. Other sets compare champions, and judge them at the end.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ class TrialSet(NamedTuple):
     generation: int = 0
     """The generation that the set belongs to, from 0."""
     block: int = 0
-    """Which of a generation's held-out blocks, 0 to 255."""
+    """Number of the held-out block of the generation, 0 to 255."""
 
     @classmethod
     def generation_of(cls, generation: int) -> TrialSet:
-        """The trials that generation ``generation`` is selected by."""
+        """The trials that select in a generation."""
         return cls.of(cls("generation", generation))
 
     @classmethod
     def held_out(cls, generation: int, block: int = 0) -> TrialSet:
-        """Trials that candidates for the champion are compared by after a generation."""
+        """The trials that compare candidates for the champion after a generation."""
         return cls.of(cls("held_out", generation, block))
 
     @classmethod
     def judgement(cls, generation: int) -> TrialSet:
-        """Trials that say what the champion is worth after the last generation."""
+        """The trials that judge the champion after the last generation."""
         return cls.of(cls("judgement", generation))
 
     @classmethod
     def evaluation(cls) -> TrialSet:
-        """Trials of no evolution, the ones of ``swarmctl evaluate``."""
+        """The trials of ``swarmctl evaluate``, which no evolution uses."""
         return cls("evaluation")
 
     @classmethod
@@ -69,7 +69,7 @@ AnyTrialSet = Union[int, TrialSet]
 def address(
     trial_set: AnyTrialSet, trials: int | range | None, default: int
 ) -> tuple[str, int, int, int, int]:
-    """What the extension takes: set and range of trials."""
+    """Set and range of trials, in the form for the extension."""
     if trials is None:
         trials = default
     if not isinstance(trials, range):

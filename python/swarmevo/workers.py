@@ -1,6 +1,6 @@
-"""Workers inside engines that already run: executors, Dask, Ray.
+"""Workers inside running engines: executors, Dask, Ray.
 
-A worker is a thread of this package, in a process of the engine; there is no program to copy.
+A worker is a thread of this package in a process of the engine; no program must be copied.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ WORKERS_MAX = 100_000
 PAUSE_MIN_S, PAUSE_MAX_S = 0.5, 30.0
 
 _stopping: dict[str, threading.Event] = {}
-"""Of the :class:`Workers` in this process, by key."""
+"""Stop events of the :class:`Workers` in this process, by key."""
 
 
 class Submits(Protocol):
     """An executor of ``concurrent.futures``, or a client of Dask."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **options: Any) -> Any:
-        """Calls ``fn``, somewhere."""
+        """Calls ``fn`` on some worker of the engine."""
 
 
 Engine = Union[Submits, ModuleType]
-"""Where workers run: an executor, a Dask client, or the module ``ray``."""
+"""An engine of workers: an executor, a Dask client, or the module ``ray``."""
 
 
 def workers(
@@ -59,17 +59,18 @@ def workers(
     """Keeps n workers alive inside a ``concurrent.futures`` executor, a Dask cluster (its
     client) or a Ray cluster (the module ``ray``, after ``ray.init``).
 
-    Each is a task that occupies a thread or process of the engine, computes ``slots`` items at
-    the same time, and leaves after ``turn`` seconds for another one to take its place. So they
-    end by themselves soon after this process does. A worker whose node is lost is started
-    again; what it was computing is computed by others.
+    Each worker is a task that occupies a thread or process of the engine and computes ``slots``
+    items at the same time. After ``turn`` seconds it leaves, and another task takes its place, so
+    workers end soon after this process does. If a node is lost, its worker is started again, and
+    other workers compute its items.
 
-    An executor of processes has to spawn them: a forked process has copies of this one's
+    An executor of processes must spawn them: a forked process has copies of this one's
     connections, and disturbs them. ``ProcessPoolExecutor(4, mp_context=get_context("spawn"))``.
 
-    ``coordinator``: its address as the workers' nodes reach it; like the other settings found
-    as :func:`connect` finds it, but the token is a worker's, in ``SWARM_WORKER_TOKEN`` or the
-    file that ``SWARM_WORKER_TOKEN_FILE`` names, here. TLS files are read where workers run.
+    ``coordinator``: its address, which the workers' nodes must reach. It and the other settings
+    default as in :func:`connect`, except for the token, which is the workers': this process reads
+    it from ``SWARM_WORKER_TOKEN`` or the file that ``SWARM_WORKER_TOKEN_FILE`` names. Workers read
+    TLS files on their own nodes.
     """
     n = arguments.whole(n, "n, the number of workers,", 1, WORKERS_MAX)
     slots = arguments.whole(slots, "slots", 1, 1024)
@@ -98,7 +99,7 @@ def serve(
     tls: tuple[str | None, str | None, str | None, str | None, bool],
     turn: float,
 ) -> None:
-    """Is a worker for ``turn`` seconds, or until the :class:`Workers` of this key in this
+    """Runs a worker for ``turn`` seconds, or until the :class:`Workers` of this key in this
     process stop. Engines call it."""
     stopping = _stopping.get(key) or threading.Event()
     worker = _core.Worker(coordinator, f"{name}-{socket.gethostname()}", slots, token, tls)
@@ -107,7 +108,7 @@ def serve(
         while worker.is_alive() and time.monotonic() < leave_at and not stopping.wait(POLL_S):
             pass
     finally:
-        # It finishes what it computes, and delivers that.
+        # The worker finishes its items and delivers the results.
         worker.stop()
         worker.join()
 
@@ -131,26 +132,26 @@ class _Adapter(Protocol):
 
 
 class Workers:
-    """n workers that are kept alive; use :func:`workers`. A context manager, which stops
-    them at its end."""
+    """A fixed number of live workers; use :func:`workers`. A context manager, which stops them at
+    its end."""
 
     def __init__(self, adapter: _Adapter, key: str, places: list[_Place]) -> None:
         self._adapter, self._key, self._places = adapter, key, places
         self._stopped = _stopping[key] = threading.Event()
         self.problem: str | None = None
-        """Why the latest of those ended that were not to: its node is lost, or the
-        coordinator has refused it, say."""
+        """The reason why the latest worker ended unexpectedly, for example a lost node or a
+        refusal by the coordinator."""
         self._keeper = threading.Thread(target=self._keep, name="swarmevo-workers", daemon=True)
         self._keeper.start()
 
     @property
     def n_running(self) -> int:
-        """Tasks that the engine has, or will begin when it has room."""
+        """Number of tasks that the engine runs or will start."""
         return sum(place.task is not None for place in self._places)
 
     def stop(self, wait: bool = True) -> None:
-        """Has all workers finish what they compute, and leave: in this process at once, in
-        others at the end of their turns. ``wait``: until they have."""
+        """Tells all workers to finish their items and to leave: in this process at once, in others
+        at the end of their turns. ``wait``: until they have left."""
         self._stopped.set()
         if wait:
             self._keeper.join()
@@ -206,7 +207,7 @@ class _OfExecutor:
         self._is_dask = type(executor).__module__.split(".")[0] == "distributed"
 
     def start(self, place: _Place) -> Any:
-        # Dask takes calls with equal arguments for one.
+        # Dask treats calls with equal arguments as one.
         options = {"pure": False} if self._is_dask else {}
         return self._executor.submit(serve, *place.arguments, **options)
 
@@ -218,7 +219,7 @@ class _OfExecutor:
 
 
 def _forks(executor: Submits) -> bool:
-    # No public attribute says how a pool starts its processes.
+    # No public attribute tells how a pool starts its processes.
     context = getattr(executor, "_mp_context", None)
     return isinstance(executor, ProcessPoolExecutor) and (
         context is not None and context.get_start_method() == "fork"

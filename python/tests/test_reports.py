@@ -77,7 +77,7 @@ def test_what_cannot_be_reported_on_is_one_line(short, tmp_path):
             (champion, "--config", PROJECT / "configs/quickstart.json", "--changed-conditions"),
             "a genotype has 424 genes, not [445]",
         ),
-        ((champion, "--config", config), "--changed-conditions reports on it"),
+        ((champion, "--config", config), "--changed-conditions accepts"),
         ((tmp_path / "half.json", "--config", config), "is no champion file"),
         (("1@3/2", "--data-dir", tmp_path), str(tmp_path)),
         ((champion, "--config", config, "--changed-conditions", "--trials", 1), "from 2 to 1000"),

@@ -260,7 +260,7 @@ def noisy(genotypes, trial_set, n_trials):
 @pytest.mark.parametrize("n", [1, 3, GENERATIONS])
 def test_a_run_with_fitness_from_elsewhere_is_kept_in_a_file(short, tmp_path, n):
     expected = swarmevo.evolve(short, progress=False, evaluate=noisy)
-    with pytest.raises(swarmevo.Interrupted, match="the same call goes on"):
+    with pytest.raises(swarmevo.Interrupted, match="the same call continues"):
         swarmevo.evolve(short, progress=False, evaluate=noisy, data_dir=tmp_path, callback=stop_after(n))
     assert {it.suffixes[-1] for it in tmp_path.iterdir()} == {".json", ".lock"}
     seen = []
@@ -291,6 +291,6 @@ def test_a_file_that_is_no_run_is_refused_and_left(short, tmp_path):
     content = json.loads(file.read_text())
     for wrong in ("", "[]", "{}", json.dumps(content | {"format": 2}), json.dumps(content | {"generations": []})):
         file.write_text(wrong)
-        with pytest.raises(ValueError, match="is no run to go on with"):
+        with pytest.raises(ValueError, match="is no run to continue"):
             swarmevo.evolve(short, 1, progress=False, evaluate=noisy, data_dir=tmp_path)
         assert file.read_text() == wrong and len(os.listdir(tmp_path)) == 2

@@ -1,7 +1,7 @@
-"""How an evolved swarm solves its task: measures on traces and on networks.
+"""Measures on traces and networks that explain how an evolved swarm solves its task.
 
 Arrays have the axes of :class:`swarmevo.Trace`: trials, steps, robots. Rows of a trial depend on
-each other, so that every error and every level of chance here is one over trials, never over rows.
+each other, so all errors and levels of chance here are computed over trials, never over rows.
 """
 
 from .ablation import Lesion, ablation, synapse_genes

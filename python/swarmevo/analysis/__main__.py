@@ -15,12 +15,12 @@ from .report import report
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m swarmevo.analysis", description="Writes a report on how a genotype does it.")
+    parser = argparse.ArgumentParser(prog="python -m swarmevo.analysis", description="Reports how a genotype solves its task.")
     parser.add_argument("genotype", help="champion file, or an address such as 3 or 3@5/7")
     parser.add_argument("--config", type=Path, help="experiment file; a champion file needs it, and its seed replaces the file's")
     parser.add_argument(
         "--changed-conditions", action="store_true",
-        help="report on the genotype in an experiment that it was not evolved in",
+        help="accept an experiment in which the genotype did not evolve",
     )
     parser.add_argument("--data-dir", type=Path, help="read addresses from this directory instead of a coordinator")
     parser.add_argument("--fleet", action="store_true", help="evaluate other conditions on the coordinator's fleet")
@@ -30,7 +30,7 @@ def main() -> int:
     try:
         if Path(arguments.genotype).is_file():
             if arguments.config is None:
-                parser.error("a champion file needs --config, the experiment file that it was evolved with")
+                parser.error("a champion file needs --config, the experiment file with which it evolved")
             champion = Champion.from_file(arguments.genotype)
         else:
             records = connect() if arguments.data_dir is None else open_archive(arguments.data_dir)
@@ -46,7 +46,7 @@ def main() -> int:
         title = f"{experiment.name}: {Path(arguments.genotype).stem}"
         print(report(experiment, champion.genotype, arguments.output, title=title, trials=arguments.trials, client=client))
     except OtherExperimentError as error:
-        print(f"error: {error.reason}; --changed-conditions reports on it in this one all the same", file=sys.stderr)
+        print(f"error: {error.reason}; --changed-conditions accepts this one", file=sys.stderr)
         return 1
     except (SwarmError, OSError, ValueError, KeyError) as error:
         print(f"error: {error}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""What parts of a network are worth: its fitness without them."""
+"""The worth of parts of a network: its fitness without them."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Lesion:
     """A part of a network, and the fitness without it."""
 
     part: str
-    """Its name, such as ``H1_3``, or ``H1_3 > OUT_LED_0`` of a synapse."""
+    """Its name, such as ``H1_3``, or ``H1_3 > OUT_LED_0`` for a synapse."""
     weights: Floats
-    """Of the synapses that it takes away."""
+    """Number of synapses that the lesion removes."""
     fitness: float
     """Mean over the trials without it."""
     change: float
@@ -38,7 +38,7 @@ class Lesion:
     ci95: tuple[float, float]
     """Change ± 1.96 standard errors over trials."""
     is_same: bool
-    """Whether not a bit of the fitness of any trial changes: it is not used."""
+    """Whether the fitness of all trials has the same bits: the part is not used."""
 
     __repr__ = short
 
@@ -51,15 +51,15 @@ def ablation(
     trials: int = 50,
     client: Client | None = None,
 ) -> list[Lesion]:
-    """Fitness of a genotype ``[d]`` without each of its network's ``parts``, those first that it misses most.
+    """Fitness of a genotype ``[d]`` without each of its network's ``parts``, the largest loss first.
 
-    A part is taken away by weights of 0, exactly: of a synapse; of all synapses from a neuron or from an
-    input, which then tells no other neuron anything (an output's own value still moves the robot); or of
-    a group of synapses of the experiment file. All noise stays as it was, so that the change is that of the
-    part (Meyes et al. 2019 review such experiments); effects of several parts do not add up.
+    Weights of exactly 0 remove a part: a synapse; all synapses from a neuron or an input, which then
+    influences no other neuron (an output's own value still moves the robot); or a group of synapses of the
+    experiment file. All noise stays the same, so the part alone causes the change (Meyes et al. 2019 review
+    such experiments). Effects of several parts do not add up.
 
-    In trials that had no part in evolution, here or on the fleet of ``client``. Raises ``ValueError``
-    if weights of a part are not the genotype's, or have no gene that gives 0.
+    The trials had no part in evolution; they run here or on the fleet of ``client``. Raises ``ValueError``
+    if no gene encodes a weight of a part, or if no value of the gene gives 0.
     """
     trials = arguments.whole(trials, "trials", 1, TRIALS_MAX)
     genes = experiment._genotype(genotype)
@@ -68,7 +68,7 @@ def ablation(
     where, zero = synapse_genes(experiment)
     fixed = sorted({name for name, synapses in named if (where[synapses] < 0).any() or np.isnan(zero[synapses]).any()})
     if fixed:
-        raise ValueError(f"weights that no gene sets to 0: {', '.join(fixed)}; their range has to contain 0")
+        raise ValueError(f"weights that no gene sets to 0: {', '.join(fixed)}; their range must contain 0")
     genotypes = np.tile(genes, (1 + len(named), 1))
     for row, (_, synapses) in zip(genotypes[1:], named):
         row[where[synapses]] = zero[synapses]
@@ -80,15 +80,16 @@ def ablation(
 
 
 def synapse_genes(experiment: Experiment) -> tuple[Ints, Floats]:
-    """For each of the S synapses of ``experiment.network(...).description``, the number of the gene that
-    is its weight ``[S]``, -1 if none is, and the value of that gene with which the weight is 0 ``[S]``, NaN
-    if none is."""
+    """For each of the S synapses of ``experiment.network(...).description``: the number of the gene that
+    encodes its weight ``[S]``, -1 without one; and the value of that gene for a weight of 0 ``[S]``, NaN
+    without one."""
 
     def weights(genotype: Floats) -> Floats:
         return np.array([it["weight"] for it in experiment.network(genotype).description["synapses"]])
 
     d = experiment.n_genes
-    # A weight is low + gene * span: both ends, and a genotype whose genes all differ, say which gene.
+    # A weight is low + gene * span: both ends, and a genotype whose genes all differ, identify the
+    # gene.
     low, high = weights(np.zeros(d)), weights(np.ones(d))
     span = high - low
     is_gene = span != 0
@@ -103,7 +104,7 @@ def synapse_genes(experiment: Experiment) -> tuple[Ints, Floats]:
 
 
 def _parts(network: Network, parts: Parts) -> list[tuple[str, Ints]]:
-    """Names, and the numbers of the synapses that each takes away."""
+    """Names, and the numbers of the synapses that each lesion removes."""
     synapses = network.description["synapses"]
     sources = [_source(network, it["pre"]) for it in synapses]
     if parts == "synapses":

@@ -1,4 +1,4 @@
-"""How does it do it? In words, each of which is said by a number."""
+"""How does the swarm solve its task? An answer in words, each backed by a number."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .settling import Settled
 from .wording import half_width, listed, message, share
 
 SMALL = 0.05
-"""A change of the fitness by less than this share of it is called small."""
+"""A change of the fitness below this share of it counts as small."""
 CONSTANT = 0.99
-"""An input whose most frequent value comes in more than this share is a constant."""
+"""An input whose most frequent value exceeds this share counts as a constant."""
 
 
 def answer(found: Findings) -> list[str]:
-    """Sentences, from what matters to what does not; what cannot be said of a genotype is left out."""
+    """Sentences, the most important first. Leaves out statements that do not apply to a genotype."""
     return [
         *_inputs(found),
         *_modes(found),
@@ -46,7 +46,7 @@ def _inputs(found: Findings) -> list[str]:
 
 
 def _matters(it: Input) -> bool:
-    """Whether the fitness is lower without it, and not by a little."""
+    """Whether the fitness is clearly lower without the input."""
     change, fitness = float(it.change.mean()), float((it.fitness - it.change).mean())
     return change + half_width(it.change) < 0 and -change > SMALL * abs(fitness)
 
@@ -54,7 +54,7 @@ def _matters(it: Input) -> bool:
 def _loss(it: Input, whole: float) -> str:
     said = f"Without {it.sensor} the fitness is {it.fitness.mean():.3f} instead of {whole:.3f}"
     if it.usual > CONSTANT:
-        said += f", although it says the same in {share(it.usual)} of what is sensed: it is used as a constant"
+        said += f", although it has the same value in {share(it.usual)} of its readings: it serves as a constant"
     return said + "."
 
 
@@ -63,7 +63,7 @@ def _modes(found: Findings) -> list[str]:
         return []
     trace, sends = found.trace, found.trace.sends[:, FIRST:]
     if found.use.sends > 0.9995:
-        return ["All robots send in every step; nobody relays, so that robots hear their neighbours alone."]
+        return ["All robots send in every step; no robot relays, so robots hear only their neighbours."]
     said = [f"Robots send their own message in {share(found.use.sends)} of the steps, and relay what they hear in the others."]
     lit = trace.leds[:, FIRST:] > 0
     if lit.any() and not lit.all():
@@ -79,8 +79,8 @@ def _symbols(found: Findings) -> list[str]:
     use, trace = found.use, found.trace
     heard = list(use.shares.items())[:3]
     if use.entropy == 0:
-        return [f"Every message is {message(heard[0][0])}: it says nothing but that somebody is there."]
-    said = [f"What is sent has {use.entropy:.2f} bits: " + listed([f"{message(it)} in {share(of)}" for it, of in heard]) + "."]
+        return [f"Every message is {message(heard[0][0])}: it tells only that a robot is near."]
+    said = [f"The sent messages have {use.entropy:.2f} bits: " + listed([f"{message(it)} in {share(of)}" for it, of in heard]) + "."]
     lit = trace.leds[:, FIRST:] > 0
     if lit.any() and not lit.all():
         code = symbols(trace)
@@ -97,7 +97,7 @@ def _symbols(found: Findings) -> list[str]:
 
 
 def _meaning(found: Findings) -> list[str]:
-    starts = {"Of its sender, a message tells most about": found.told, "Of what its hearer then does, it tells most about": found.heeded}
+    starts = {"About its sender, a message tells most of": found.told, "About its hearer's next action, it tells most of": found.heeded}
     clearest = [(start, _clearest(of)) for start, of in starts.items()]
     return [f"{start} {it[0]}: {it[1].bits:.2f} bits, {it[1].chance:.2f} of them by chance." for start, it in clearest if it is not None]
 
@@ -117,7 +117,7 @@ def _heeding(found: Findings) -> list[str]:
         said.append(
             f"A single message, replaced by zeros, changes what another robot does within ten steps in {moved} of {it.said.sum()} cases{led}."
             if it.reached.any()
-            else f"None of {it.said.sum()} messages that were replaced by zeros changed what anybody does."
+            else f"None of {it.said.sum()} messages that were replaced by zeros changed the action of any robot."
         )
     for sensor, of in found.attention.items():
         if of.sensed.any():
@@ -131,9 +131,10 @@ def _heeding(found: Findings) -> list[str]:
 
 
 def _settling(found: Findings) -> list[str]:
-    """Where it settles: each pattern of outputs with the inputs that lead to it."""
+    """The states where the network settles: each pattern of outputs, with the inputs that lead to
+    it."""
     rest = [it for it in found.settled if isinstance(it.attractor, Equilibrium)]
-    # Outputs that are the same under all inputs say nothing of them.
+    # Leaves out outputs that are the same under all inputs.
     changing = [name for name in (rest[0].outputs if rest else ()) if len({round(it.outputs[name][0], 1) for it in rest}) > 1]
     if rest and not changing:
         alike = _rates(rest[0], [*rest[0].outputs])

@@ -25,9 +25,9 @@ def displacements(positions: ArrayLike, size: ArrayLike) -> Floats:
 
 
 def components(positions: ArrayLike, size: ArrayLike, reach: float) -> Iterator[tuple[Ints, Floats]]:
-    """The connected parts of a swarm, whose robots less than ``reach`` apart are connected: the numbers
-    of their robots ``[K]``, and where these are in the plane ``[K, 2]``, in one piece also where the
-    part lies across the seam of the torus."""
+    """The connected parts of a swarm, in which robots less than ``reach`` apart are connected: for each
+    part, the numbers of its robots ``[K]`` and their positions in the plane ``[K, 2]``, in one piece
+    even across the seam of the torus."""
     points = np.asarray(positions, np.float64)
     ways = displacements(points, size)
     near = np.hypot(ways[..., 0], ways[..., 1]) < reach
@@ -48,7 +48,8 @@ def components(positions: ArrayLike, size: ArrayLike, reach: float) -> Iterator[
 
 def alpha_shape(points: ArrayLike, radius: float) -> tuple[Ints, Ints]:
     """The outer border of the alpha shape of ``points`` ``[K, 2]`` (Edelsbrunner, Kirkpatrick & Seidel
-    1983), holes filled: of the union of the Delaunay triangles whose circumradius is less than ``radius``.
+    1983), with holes filled: that of the union of the Delaunay triangles whose circumradius is less than
+    ``radius``.
 
     Returns the points that the union does not surround ``[B]``, in ascending order, and the edges of
     its outline ``[E, 2]``. All points are border if they lie on a line or if there is no such triangle.
@@ -103,7 +104,7 @@ def _circumradii(corners: Floats) -> Floats:
 
 
 def _reached(solid: NDArray[np.bool_], neighbours: Ints) -> NDArray[np.bool_]:
-    """Triangles that are reached from afar without crossing a solid one."""
+    """Triangles that a path from outside reaches without crossing a solid one."""
     outside = np.zeros(len(solid), bool)
     queue = np.flatnonzero((neighbours < 0).any(axis=1) & ~solid).tolist()
     outside[queue] = True

@@ -1,4 +1,4 @@
-"""Who says what, what it tells, and who heeds it."""
+"""The channel of a swarm: its messages, their information, and the reactions of hearers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .information import Codes, Dependence, dependence, entropy, mutual_informat
 from ..representation import short
 
 FIRST = 10
-"""The first step that counts: until then robots are made to send."""
+"""The first step that counts: before it, the simulator forces robots to send."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Symbols:
     own: Codes
     """``[T, steps, R]``: code of each robot's own message, sent or not."""
     heard: Codes
-    """``[T, steps, R]``: code of the message that it heard; -1 without a frame."""
+    """``[T, steps, R]``: code of the message that each robot heard; -1 without a frame."""
 
     __repr__ = short
 
@@ -55,19 +55,19 @@ class ChannelUse:
     sends: float
     """Share of robots and steps that send their own message; the others relay."""
     shares: dict[tuple[float, ...], float]
-    """Share of each symbol among what is sent, most frequent first."""
+    """Share of each symbol among the sent messages, most frequent first."""
     entropy: float
-    """Of these shares, bits: 0 is a channel without content."""
+    """Entropy of these shares, bits: 0 is a channel without content."""
     hears: float
-    """Share of robots and steps that hear something."""
+    """Share of robots and steps that hear a frame."""
     hops: NDArray[np.float64]
-    """Share of the frames that are heard by their number of emissions, from 1 on."""
+    """Share of the heard frames by their number of emissions, from 1 on."""
 
     __repr__ = short
 
 
 def channel_use(trace: Trace, first: int = FIRST) -> ChannelUse:
-    """What is sent and heard from step ``first`` on."""
+    """Statistics of sent and heard messages from step ``first`` on."""
     first = arguments.whole(first, "first", 0)
     found = symbols(trace, first)
     sends = trace.sends[:, first:]
@@ -86,17 +86,17 @@ def channel_use(trace: Trace, first: int = FIRST) -> ChannelUse:
 
 
 def heard(trace: Trace, first: int = FIRST) -> Codes:
-    """``[T, steps, R]``: what each robot heard, with 0 for nothing, else the symbol's code + 1."""
+    """``[T, steps, R]``: the symbol that each robot heard, as its code + 1; 0 for none."""
     first = arguments.whole(first, "first", 0)
     return symbols(trace, first).heard + 1
 
 
 def signalling(trace: Trace, about: ArrayLike, *, first: int = FIRST, shuffles: int = 200) -> Dependence:
-    """*Positive signalling* (Lowe et al. 2019): what a message tells of its sender.
+    """*Positive signalling* (Lowe et al. 2019): the information of a message about its sender.
 
     ``about`` is a code ``[T, steps, R]`` of the sender's state or stimuli in all steps, such as
-    ``trace.leds`` or ``discretise(trace.stimuli[..., 0])``; negative where there is none. Only what is
-    sent counts. It says nothing of whether anybody listens.
+    ``trace.leds`` or ``discretise(trace.stimuli[..., 0])``; negative for missing values. Only sent
+    messages count. It does not tell whether any robot listens.
     """
     first = arguments.whole(first, "first", 0)
     shuffles = arguments.whole(shuffles, "shuffles", 0)
@@ -105,11 +105,11 @@ def signalling(trace: Trace, about: ArrayLike, *, first: int = FIRST, shuffles: 
 
 
 def listening(trace: Trace, response: ArrayLike, *, first: int = FIRST, shuffles: int = 200) -> Dependence:
-    """*Positive listening*, as far as a trace shows it: what the message just heard tells of what the
-    robot then does.
+    """*Positive listening*, as far as a trace shows it: the information of the message just heard
+    about the robot's next action.
 
     ``response`` is a code ``[T, steps, R]``, such as ``trace.leds``. A robot acts on the frame of the
-    same step. Robots that are near each other also see alike: dependence is no proof of influence.
+    same step. Neighbouring robots also sense similar values, so dependence does not prove influence.
     """
     first = arguments.whole(first, "first", 0)
     shuffles = arguments.whole(shuffles, "shuffles", 0)
@@ -120,10 +120,11 @@ def listening(trace: Trace, response: ArrayLike, *, first: int = FIRST, shuffles
 def speaker_consistency(
     trace: Trace, action: ArrayLike, lags: Iterable[int] = range(5), *, first: int = FIRST
 ) -> dict[int, float]:
-    """Speaker consistency by lag: how far a robot does what it says. Jaques et al. (2019) average
-    normalised conditional entropies; here it is the mutual information of the message that a robot sends
-    and what itself does ``lag`` steps later, as a share of the message's entropy (the uncertainty
-    coefficient, Theil 1970): 1 if the message follows from the action, 0 if it has no content.
+    """Speaker consistency by lag: the agreement of a robot's messages with its actions. Jaques et al.
+    (2019) average normalised conditional entropies; here it is the mutual information of the message
+    that a robot sends and its own action ``lag`` steps later, as a share of the message's entropy (the
+    uncertainty coefficient, Theil 1970): 1 if the message follows from the action, 0 if it has no
+    content.
     """
     first = arguments.whole(first, "first", 0)
     found, done = symbols(trace, first).own, np.asarray(action, dtype=np.int64)[:, first:]
@@ -141,8 +142,8 @@ def speaker_consistency(
 
 
 def informants(trace: Trace, first: int = FIRST) -> NDArray[np.float64]:
-    """``[R, R]``: of what robot i heard, the share that robot j had first sent, over all trials; rows of
-    robots that heard nothing are zeros."""
+    """``[R, R]``: the share of the messages heard by robot i that robot j had first sent, over all
+    trials; rows of robots that heard nothing are zeros."""
     first = arguments.whole(first, "first", 0)
     n = trace.n_robots
     originators = trace.frame_originators[:, first:]
@@ -156,9 +157,9 @@ def informants(trace: Trace, first: int = FIRST) -> NDArray[np.float64]:
 
 
 def sectors_heard(trace: Trace, window: int = 10) -> Codes:
-    """``[T, steps, R]``: from how many sectors of its receiver a robot heard something within the last
-    ``window`` steps, this one included: how the thesis counts neighbours (Fig. 6.19). Steps before the
-    window is full are counted as far as there are any."""
+    """``[T, steps, R]``: the number of sectors of its receiver in which a robot heard a frame within
+    the last ``window`` steps, this one included. The thesis counts neighbours this way (Fig. 6.19). In
+    the first steps, the window is shorter."""
     window = arguments.whole(window, "window", 1)
     sectors = np.asarray(trace.frame_sectors)
     found = np.zeros(sectors.shape, dtype=np.int64)

@@ -1,9 +1,9 @@
-"""How the equilibria of a network move while an input changes, and where they change their kind.
+"""The movement of a network's equilibria while an input changes, and their bifurcations.
 
 Pseudo-arclength continuation (Keller 1977; Kuznetsov, Elements of Applied Bifurcation Theory 2004, chapter
-10): a branch is followed along its own length, so that it is also followed around folds. Where real parts of
-eigenvalues change their sign, the point is searched for: a pair of complex ones is a Hopf bifurcation, a
-single real one a fold.
+10): the method follows a branch along its own length, so also around folds. It locates points where real
+parts of eigenvalues change their sign: a pair of complex eigenvalues is a Hopf bifurcation, a single real
+one a fold.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from ..representation import short
 Floats = NDArray[np.float64]
 
 _TOLERANCE = 1e-10
-"""Of dv/dt at an equilibrium."""
+"""Tolerance of dv/dt at an equilibrium."""
 _SAME = 1e-4
-"""Two equilibria at one end are one if their rates differ by less."""
+"""Two equilibria at one end are the same if their rates differ by less."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,13 @@ class Bifurcation:
     """A point of a branch at which its equilibria change their kind."""
 
     kind: Literal["hopf", "fold"]
-    """Whether a limit cycle is born there, or two equilibria meet."""
+    """The kind: a limit cycle begins there, or two equilibria meet."""
     share: float
-    """Where: of the way from the first inputs to the last, in [0, 1]."""
+    """The position on the way from the first inputs to the last, in [0, 1]."""
     equilibrium: Equilibrium
-    """The one there: real parts of one or two of its eigenvalues are 0."""
+    """The equilibrium there: the real parts of one or two of its eigenvalues are 0."""
     period: float
-    """Of the cycle that is born, 2 pi / the imaginary part, in the unit of tau; NaN of a fold."""
+    """Period of the new cycle, 2 pi / the imaginary part, in the unit of tau; NaN for a fold."""
 
     __repr__ = short
 
@@ -49,7 +49,7 @@ class Branch:
     """A curve of equilibria: K points in the order of its length."""
 
     shares: Floats
-    """``[K]``: of the way from the first inputs to the last, in [0, 1]."""
+    """``[K]``: positions on the way from the first inputs to the last, in [0, 1]."""
     voltages: Floats
     """``[K, N]``"""
     rates: Floats
@@ -61,7 +61,7 @@ class Branch:
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """``[K]``: which of its points attract."""
+        """``[K]``: whether each of its points attracts."""
         return np.asarray(self.eigenvalues[:, 0].real < 0)
 
     __repr__ = short
@@ -70,11 +70,12 @@ class Branch:
 def continuation(
     network: CTRNN, first: ArrayLike, last: ArrayLike, *, starts: int = 200, max_step: float = 0.02, max_points: int = 20_000
 ) -> list[Branch]:
-    """The equilibria of ``network`` while its inputs go in a straight line from ``first`` to ``last``, both ``[I]``.
+    """The equilibria of ``network`` while its inputs move in a straight line from ``first`` to ``last``, both
+    ``[I]``.
 
-    Branches begin at the equilibria that ``starts`` random searches find at either end: a branch that
-    reaches neither end, a closed one, is not found. ``max_step``: the longest step, in shares of the way
-    and in units of voltage together. Raises ``ValueError`` if a branch takes more than ``max_points``.
+    Branches begin at the equilibria that ``starts`` random searches find at either end: a closed branch,
+    which reaches neither end, is not found. ``max_step``: the maximum step length, over shares of the way and
+    voltages together. Raises ``ValueError`` if a branch takes more than ``max_points``.
     """
     starts = arguments.whole(starts, "starts", 1)
     max_points = arguments.whole(max_points, "max_points", 1)
@@ -90,7 +91,7 @@ def continuation(
 
 @dataclass(frozen=True)
 class _Path:
-    """Equilibria x = (v, s): dv/dt is 0 for the inputs of the share s of the way."""
+    """Equilibria x = (v, s): dv/dt is 0 for the inputs at the share s of the way."""
 
     network: CTRNN
     first: Floats
@@ -103,7 +104,7 @@ class _Path:
         return self.network.derivative(x[:-1], self.inputs(float(x[-1])))
 
     def slopes(self, x: Floats) -> Floats:
-        """``[N, N + 1]``: of dv/dt by v and s."""
+        """``[N, N + 1]``: the derivative of dv/dt with respect to v and s."""
         by_share = self.network.input_weights @ self.change / self.network.tau
         return np.column_stack([self.network.jacobian(x[:-1]), by_share])
 
@@ -141,10 +142,10 @@ def _branch(path: _Path, share: float, start: Equilibrium, max_step: float, max_
     length = max_step / 4
     while 0 <= points[-1][-1] <= 1:
         if len(points) > max_points:
-            raise ValueError(f"a branch of more than {max_points} points; a larger max_points or max_step follows it on")
+            raise ValueError(f"a branch of more than {max_points} points; increase max_points or max_step")
         there = path.step(points[-1], tangent, length)
         onwards = None if there is None else path.tangent(there[0], tangent)
-        # A sharp bend may be a jump to another branch: a shorter step shows.
+        # A sharp bend may be a jump to another branch: try a shorter step.
         if there is None or onwards is None or onwards @ tangent < 0.9:
             length /= 2
             if length < 1e-9:
@@ -165,7 +166,7 @@ def _branch(path: _Path, share: float, start: Equilibrium, max_step: float, max_
 
 
 def _to_the_end(path: _Path, points: list[Floats], kinds: list[Equilibrium], shares: Floats) -> None:
-    """Puts the last point, which is beyond, onto the end of the way."""
+    """Moves the last point, which lies beyond, to the end of the way."""
     with needs("analysis"):
         from scipy.optimize import root
 

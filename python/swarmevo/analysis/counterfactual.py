@@ -1,9 +1,9 @@
-"""What would have happened, had one robot said something else.
+"""Counterfactuals: what would have happened if one robot had sent another message?
 
-Every draw of noise has an address, so that an episode in which one message is another one shares all
-draws with the episode as it was: what differs afterwards was caused by that message, exactly, without
-estimates. It is the causal influence of communication of Lowe et al. (2019), for a single message; the same
-is asked of what a single robot senses.
+Every draw of noise has an address, so an episode with one replaced message shares all draws with the
+original episode: that message caused every later difference, exactly and without estimates. This is the
+causal influence of communication of Lowe et al. (2019), for a single message. The readings of a single
+robot can be replaced likewise.
 """
 
 from __future__ import annotations
@@ -27,21 +27,22 @@ Replacement = Union[Literal["freeze", "permute", "silence"], ArrayLike]
 
 @dataclass(frozen=True)
 class Influence:
-    """What single messages did. Axes: T trials, K steps, A agents that said them."""
+    """The effects of single messages. Axes: T trials, K steps, A agents that sent them."""
 
     steps: list[int]
     """``[K]``: the steps in which messages were replaced."""
     agents: list[int]
-    """``[A]``: the robots that said them, by their numbers among all robots."""
+    """``[A]``: the robots that sent them, by their numbers among all robots."""
     said: NDArray[np.bool_]
-    """``[T, K, A]``: whether there was a message to replace: the robot sent its own, and the
-    replacement is another one (before both are quantised to symbols). With ``"silence"``, everywhere."""
+    """``[T, K, A]``: whether a message was replaced: the robot sent its own, and the replacement differs
+    (before both are quantised to symbols). With ``"silence"``, always true."""
     reached: NDArray[np.int64]
-    """``[T, K, A]``: how many other agents did anything otherwise, by a bit, within the window."""
+    """``[T, K, A]``: number of other agents whose actions differ, by at least a bit, within the
+    window."""
     leds: NDArray[np.int64]
-    """``[T, K, A]``: over how many agents and steps of the window another agent's LED was otherwise."""
+    """``[T, K, A]``: number of agents and steps of the window in which another agent's LED differs."""
     fitness: NDArray[np.float64]
-    """``[T, K, A]``: mean fitness of the window's steps minus what it was; 0 where no step counts."""
+    """``[T, K, A]``: change of the mean fitness of the window's steps; 0 if no step counts."""
 
     __repr__ = short
 
@@ -59,12 +60,12 @@ def influence(
     window: int = 10,
 ) -> Influence:
     """Replaces the message of one agent in one step, once for each of ``steps`` and of ``agents`` (indices
-    among the agents; all if absent), and looks at the ``window`` steps after it.
+    among the agents; all if absent), and measures the ``window`` steps after it.
 
-    ``replace``: the message instead, ``[M]`` or one number for all its values; ``"freeze"``, what the
-    agent would have said in the step before; ``"permute"``, what the next agent says; ``"silence"``, nothing: the
-    agent emits no frame, not even one that it relays, so that others are heard where it was the loudest.
-    ``lasting``: for how many steps, within the window.
+    ``replace``: the new message, ``[M]`` or one number for all its values; ``"freeze"``, the agent's message
+    of the previous step; ``"permute"``, the message of the next agent; ``"silence"``, no frame, not even a
+    relayed one, so that receivers hear the next strongest emitter. ``lasting``: the number of steps, within
+    the window.
     """
     case = _Case(experiment, genotype, steps, agents, trials, trial_set, window, lasting)
     if case.message_len == 0:
@@ -84,22 +85,22 @@ def influence(
 
 @dataclass(frozen=True)
 class Attention:
-    """What single things that were sensed did. Axes: T trials, K steps, A agents that sensed them."""
+    """The effects of single readings. Axes: T trials, K steps, A agents that sensed them."""
 
     steps: list[int]
-    """``[K]``: the steps from which on they were replaced."""
+    """``[K]``: the first steps in which readings were replaced."""
     agents: list[int]
     """``[A]``: the robots that sensed them, by their numbers among all robots."""
     sensed: NDArray[np.bool_]
-    """``[T, K, A]``: whether there was anything to replace: the replacement is something else."""
+    """``[T, K, A]``: whether the replacement differs from the reading."""
     heeded: NDArray[np.bool_]
-    """``[T, K, A]``: whether the robot itself did anything otherwise, by a bit, from that step on."""
+    """``[T, K, A]``: whether the robot's own actions differ, by at least a bit, from that step on."""
     leds: NDArray[np.int64]
-    """``[T, K, A]``: in how many steps its own LED was otherwise."""
+    """``[T, K, A]``: number of steps in which its own LED differs."""
     reached: NDArray[np.int64]
-    """``[T, K, A]``: how many other agents did anything otherwise."""
+    """``[T, K, A]``: number of other agents whose actions differ."""
     fitness: NDArray[np.float64]
-    """``[T, K, A]``: mean fitness of these steps minus what it was; 0 where no step counts."""
+    """``[T, K, A]``: change of the mean fitness of these steps; 0 if no step counts."""
 
     __repr__ = short
 
@@ -117,14 +118,14 @@ def attention(
     trial_set: AnyTrialSet | None = None,
     window: int = 10,
 ) -> Attention:
-    """Replaces what one agent senses, once for each of ``steps`` and of ``agents`` (indices among the
-    agents; all if absent), and looks at that step and the ``window`` after it: the hearer's side of
-    :func:`influence`. Its radio still relays what it heard; what is inhibited stays so.
+    """Replaces a reading of one agent, once for each of ``steps`` and of ``agents`` (indices among the
+    agents; all if absent), and measures that step and the ``window`` after it: the hearer's side of
+    :func:`influence`. Its radio still relays the received message; inhibited inputs stay inhibited.
 
     ``sensor``: ``wireless_receiver`` for all inputs from the radio, ``wireless_receiver:msg`` for one of them,
     another sensor of the network, or ``all``. ``replace``: a number, or the values ``[C]`` of these C inputs;
-    ``"freeze"``, what they were in the step before; ``"permute"``, what the next agent senses.
-    ``lasting``: for how many steps, within the window.
+    ``"freeze"``, their values of the previous step; ``"permute"``, the readings of the next agent.
+    ``lasting``: the number of steps, within the window.
     """
     case = _Case(experiment, genotype, steps, agents, trials, trial_set, window, lasting)
     columns = input_columns(experiment, sensor)
@@ -154,7 +155,7 @@ def input_columns(experiment: Experiment, sensor: str) -> list[int]:
 
 
 class _Case:
-    """Which counterfactuals are asked for, and the episodes as they were."""
+    """The requested counterfactuals, and the original episodes."""
 
     def __init__(
         self, experiment: Experiment, genotype: Genes, steps: Iterable[int], agents: Iterable[int] | None,
@@ -183,7 +184,7 @@ class _Case:
         self.real.run(episodes, self._genotype)
 
     def places(self) -> Iterator[tuple[tuple[slice, int, int], int, int]]:
-        """Where the results of a step and an agent belong."""
+        """The place of the results of a step and an agent."""
         for k, step in enumerate(self.steps):
             for a, agent in enumerate(self._chosen):
                 yield (slice(None), k, a), step, agent
@@ -209,7 +210,7 @@ class _Course:
         self._fitness: list[NDArray[np.float64]] = []
 
     def run(self, episodes: Episodes, genotype: ArrayLike, change: _Said | _Sensed | None = None) -> None:
-        """Runs them. ``changed`` is then in which trials ``change`` changed anything, ``[T]``."""
+        """Runs them. ``changed`` ``[T]`` tells whether ``change`` had an effect in each trial."""
         episodes.load(genotype)
         self.changed = np.zeros(episodes.n_trials, bool)
         for step in range(self.end):
@@ -226,7 +227,7 @@ class _Course:
         self.leds = np.stack([it.leds for it in self._actions])
 
     def differs(self, other: _Course, steps: slice) -> NDArray[np.bool_]:
-        """``[steps, T, A]``: who does anything otherwise."""
+        """``[steps, T, A]``: whether an agent's actions differ."""
         pairs = zip(self._actions[steps], other._actions[steps])
         return np.stack([
             (mine.wheels != its.wheels).any(axis=-1)
@@ -237,7 +238,7 @@ class _Course:
         ])
 
     def other_leds(self, other: _Course, steps: slice) -> NDArray[np.bool_]:
-        """``[steps, T, A]``: whose LED is otherwise."""
+        """``[steps, T, A]``: whether an agent's LED differs."""
         return np.asarray(self.leds[steps] != other.leds[steps])
 
     def worth(self, steps: slice) -> NDArray[np.float64]:
@@ -256,7 +257,8 @@ class _Said:
         self._before: NDArray[np.float64] | None = None
 
     def step_with(self, episodes: Episodes, step: int, actions: Actions) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """A step with it, if it is time. Its fitness, and in which trials something else was on the air."""
+        """Takes a step, with the new message if it is due. Returns its fitness, and the trials in which the
+        emissions differ."""
         said = actions.messages
         if self._before is None and step >= self.step - 1:
             self._before = said
@@ -282,7 +284,7 @@ class _Sensed:
         self._before: NDArray[np.float64] | None = None
 
     def stimulate(self, episodes: Episodes, step: int) -> NDArray[np.bool_]:
-        """Has the agent sense it, if it is time; returns in which trials it is something else."""
+        """Replaces the agent's inputs if due; returns the trials in which they differ."""
         if not self.step - 1 <= step < self.step + self._lasting:
             return np.zeros(episodes.n_trials, bool)
         stimuli = episodes.stimuli
@@ -294,14 +296,15 @@ class _Sensed:
         changed = stimuli.copy()
         changed[:, self._agent, self._columns] = _instead(self._replacement, self._agent, values, self._before)
         episodes.stimuli = changed
-        # Read again: what is inhibited is as it was.
+        # Read again, because inhibited inputs keep their values.
         return np.asarray((episodes.stimuli != stimuli)[:, self._agent, self._columns].any(axis=-1))
 
 
 def _instead(
     replacement: Replacement, agent: int, values: NDArray[np.float64], before: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What an agent has instead of its ``values`` ``[T, A, C]``, ``[T, C]``; ``before``: a step before."""
+    """The replacement of an agent's ``values`` ``[T, A, C]``, as ``[T, C]``; ``before``: the values of the
+    previous step."""
     if isinstance(replacement, str):
         if replacement == "freeze":
             return before[:, agent]

@@ -1,7 +1,7 @@
-"""A network alone: where its state goes under inputs that are held (thesis, section 2.1.3).
+"""An isolated network: the course of its state under constant inputs (thesis, section 2.1.3).
 
 tau dv/dt = -v + W u + W_in phi, u = F(g (v + beta)): Eq. 2.6, in continuous time; `trajectory` is
-Euler's method as the simulator has it. Needs SciPy (`analysis`).
+Euler's method as in the simulator. Needs SciPy (`analysis`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ..representation import short
 Floats = NDArray[np.float64]
 
 _NEAR = 1e-6
-"""Two equilibria whose rates differ by less are one."""
+"""Two equilibria whose rates differ by less are the same."""
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A state that stays."""
+    """An equilibrium: a state that does not change."""
 
     voltages: Floats
     """``[N]``"""
@@ -36,7 +36,7 @@ class Equilibrium:
 
     @property
     def is_stable(self) -> bool:
-        """Whether states near it come back: a point attractor."""
+        """Whether nearby states return to it: a point attractor."""
         return bool(self.eigenvalues[0].real < 0)
 
     __repr__ = short
@@ -44,12 +44,12 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """A state that goes round and round."""
+    """A limit cycle: states that repeat themselves."""
 
     period: float
-    """In the unit of tau."""
+    """Period in the unit of tau."""
     rates: Floats
-    """``[K, N]``: once round, K points at equal distances in time."""
+    """``[K, N]``: K states of one period, at equal intervals of time."""
 
     __repr__ = short
 
@@ -90,7 +90,7 @@ class CTRNN:
     def of(cls, network: Network) -> CTRNN:
         """The dynamics of a genotype's network, ``experiment.network(genotype)``."""
         if network.description["neuron_model"] != "rate_model":
-            raise ValueError(f"a network of {network.description['neuron_model']}; these are the equations of rate_model")
+            raise ValueError(f"a network of {network.description['neuron_model']}; only rate_model has these equations")
         return cls(
             network.weights,
             tau=network.parameters["tau"],
@@ -111,7 +111,7 @@ class CTRNN:
         return np.asarray((drive - v) / self.tau)
 
     def jacobian(self, voltages: ArrayLike) -> Floats:
-        """Of dv/dt by v, ``[N, N]``."""
+        """The derivative of dv/dt with respect to v, ``[N, N]``."""
         slopes = self.gain * self._apply(np.asarray(voltages, np.float64), 1)
         return np.asarray((self.weights * slopes - np.eye(len(self.tau))) / self.tau[:, np.newaxis])
 
@@ -126,7 +126,8 @@ class CTRNN:
         return states
 
     def equilibria(self, inputs: ArrayLike, *, starts: int = 200, seed: int = 0) -> list[Equilibrium]:
-        """Those found from ``starts`` random rates, stable ones first; there may be more."""
+        """The equilibria found from ``starts`` random rates, stable ones first; there may be
+        more."""
         starts = arguments.whole(starts, "starts", 1)
         seed = arguments.whole(seed, "seed", 0)
         with needs("analysis"):
@@ -147,8 +148,8 @@ class CTRNN:
     def attractor(
         self, inputs: ArrayLike, *, start: ArrayLike | None = None, time: float | None = None
     ) -> Equilibrium | LimitCycle | None:
-        """Where the state goes from ``start`` (0 if absent) while the inputs are held: None if, after
-        ``time`` (400 of the slowest neuron's tau if absent), it has neither come to rest nor repeated itself."""
+        """The attractor that the state reaches from ``start`` (0 if absent) under constant inputs: None if,
+        after ``time`` (400 of the slowest neuron's tau if absent), it neither rests nor repeats itself."""
         with needs("analysis"):
             from scipy.integrate import solve_ivp
             from scipy.optimize import root
@@ -166,7 +167,7 @@ class CTRNN:
         rest = root(self.derivative, there, args=(phi,), jac=lambda v, _: self.jacobian(v), tol=1e-12)
         if rest.success and np.abs(rest.x - there).max() < 1e-4 and self.equilibrium(rest.x).is_stable:
             return self.equilibrium(rest.x)
-        # A section through the neuron that moves most: it comes back to the same point.
+        # A section through the neuron that moves most: a cycle returns to the same point.
         span = solve_ivp(flow, (0, time), there, dense_output=True, **settings)
         course = span.sol(np.linspace(0, time, 8000))
         mover = int(np.argmax(np.ptp(course, axis=1)))
@@ -188,8 +189,8 @@ class CTRNN:
         return None
 
     def follow(self, inputs: ArrayLike) -> list[Equilibrium | LimitCycle | None]:
-        """The attractor for each row of ``inputs`` ``[K, I]``, each reached from the one before: how it
-        moves, and where it changes its kind (Fig. 2.3)."""
+        """The attractor for each row of ``inputs`` ``[K, I]``, each reached from the previous one. It
+        shows how an attractor moves, and where it changes its kind (Fig. 2.3)."""
         found: list[Equilibrium | LimitCycle | None] = []
         start: Floats = np.zeros(len(self.tau))
         for phi in np.asarray(inputs, np.float64):
@@ -200,7 +201,7 @@ class CTRNN:
         return found
 
     def equilibrium(self, voltages: Floats) -> Equilibrium:
-        """What a state ``[N]`` at which dv/dt is 0 is like."""
+        """The equilibrium at a state ``[N]`` with dv/dt = 0."""
         values = np.linalg.eigvals(self.jacobian(voltages)).astype(np.complex128)
         return Equilibrium(voltages, self.rates(voltages), values[np.argsort(-values.real)])
 

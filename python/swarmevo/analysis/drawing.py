@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = ("#1f6fb4", "#d9480f", "#2b8a3e", "#7b3fa0", "#b08900", "#495057")
-"""Of curves, in this order."""
+"""Colours of curves, in this order."""
 ON, OFF = "#d9480f", "#4c78a8"
-"""Of robots with the LED on, or that see the light, and of the others."""
+"""Colours of robots with the LED on or in sight of the light, and of the other robots."""
 
 _STYLE = {
     "axes.spines.top": False,
@@ -40,7 +40,7 @@ _STYLE = {
 
 
 def style() -> AbstractContextManager[None]:
-    """How figures look that are made within it."""
+    """A context that sets the style of figures."""
     with needs("plot"):
         import matplotlib
 
@@ -60,7 +60,7 @@ def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **optio
 
 
 def save_png(figure: Figure, path: Path) -> None:
-    """Writes a small PNG: a palette, by which figures of few colours lose nothing."""
+    """Writes a small PNG with a palette, which is lossless for figures of few colours."""
     from PIL import Image
 
     file = io.BytesIO()
@@ -75,16 +75,16 @@ def band(axis: Axes, values: ArrayLike, label: str, colour: str, linewidth: floa
     array = np.asarray(values, np.float64)
     at = np.arange(array.shape[1])
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # steps without any trial are gaps
+        warnings.simplefilter("ignore", RuntimeWarning)  # steps without a value in any trial are gaps
         first, median, third = np.nanquantile(array, (0.25, 0.5, 0.75), axis=0)
     axis.fill_between(at, first, third, color=colour, alpha=0.2, linewidth=0)
     axis.plot(at, median, color=colour, label=label, linewidth=linewidth)
 
 
 def bands(axis: Axes, curves: Mapping[str, ArrayLike]) -> None:
-    """:func:`band` of each, with a legend."""
+    """A :func:`band` for each, with a legend."""
     for i, ((label, values), colour) in enumerate(zip(curves.items(), COLOURS)):
-        # The first one is seen beneath others that coincide with it.
+        # The first curve stays visible beneath others that coincide with it.
         band(axis, values, label, colour, linewidth=2.6 if i == 0 else 1.2)
     axis.set_xlabel("step")
     axis.margins(x=0)
@@ -118,7 +118,7 @@ def bars(axis: Axes, labels: Sequence[str], shares: Iterable[Proportion], colour
     found = list(shares)
     heights = np.array([100 * it.share for it in found])
     ends = 100 * np.array([it.ci95 for it in found])
-    # Outside of an interval that is cut off at 0 or 1 there is nothing to draw.
+    # An interval that is cut off at 0 or 1 has no bar beyond.
     errors = np.abs(np.nan_to_num(ends.T - heights))
     at = range(len(found))
     axis.bar(at, heights, width=0.6, color=colours or [COLOURS[0]] * len(found))
@@ -159,8 +159,8 @@ def swarm(
     labels: bool = False,
     arrows: float = 9,
 ) -> None:
-    """Robots ``[R, 2]``, who can hear whom (closer than ``reach``), and where they head: by arrows of which
-    ``arrows`` fit into the width."""
+    """Robots ``[R, 2]``, with lines between those in radio range (closer than ``reach``), and their
+    headings as arrows, ``arrows`` of which fit into the width."""
     points = np.asarray(positions, np.float64)
     if edges:
         ways = displacements(positions, size)

@@ -1,4 +1,4 @@
-"""What a report knows of a genotype, measured once."""
+"""The measurements of a genotype for a report."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from ..representation import short
 Floats = NDArray[np.float64]
 
 COUNTERFACTUAL_TRIALS = 10
-"""Episodes of counterfactuals; each takes an episode of its own."""
+"""Number of episodes for counterfactuals; each counterfactual simulates another episode."""
 MOMENTS = 20
-"""About how many steps of an episode they are asked in."""
+"""Approximate number of steps of an episode with counterfactuals."""
 
 
 @dataclass(frozen=True)
 class Input:
-    """One sensor, or one reading of it, as the networks get it."""
+    """One sensor, or one of its readings, as an input of networks."""
 
     sensor: str
     fitness: Floats
@@ -41,42 +41,44 @@ class Input:
     change: Floats
     """``[T]``: fitness without it minus fitness with it."""
     usual: float
-    """Share of robots and steps in which its most frequent value comes, of those that sense anything by it."""
+    """Share of its most frequent value, among the robots and steps with a reading."""
 
     __repr__ = short
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Of one genotype, in trials that had no part in its evolution."""
+    """Findings about one genotype, in trials that had no part in its evolution."""
 
     experiment: Experiment
     genotype: Floats
     trace: Trace
     inputs: list[Input]
-    """Those first that it misses most."""
+    """Inputs, the largest loss first."""
     conditions: list[Condition]
     use: ChannelUse | None
-    """None without radio; nor have ``told``, ``heeded`` and so on anything then."""
+    """None without radio; ``told``, ``heeded`` and the like are then empty."""
     spread: Spread | None
     told: dict[str, Dependence]
-    """What a message tells of its sender."""
+    """The information of a message about its sender."""
     heeded: dict[str, Dependence]
-    """What a message tells of what its hearer then does."""
+    """The information of a message about its hearer's next action."""
     influence: Influence | None
     attention: dict[str, Attention]
-    """By sensor: what replacing it by zeros, for one step of one robot, does."""
+    """By sensor: the effect of zeros instead of its readings, for one step of one robot."""
     lesions: dict[str, list[Lesion]]
-    """Of groups of synapses and of neurons, those first that are missed most."""
+    """Lesions of groups of synapses and of neurons, the largest loss first."""
     components: Components
     settled: list[Settled]
-    """Where the network goes alone, under the inputs that come most often; of rate neurons."""
+    """The states where an isolated network of rate neurons settles, under the most frequent
+    inputs."""
 
     __repr__ = short
 
 
 def findings(experiment: Experiment, genotype: Genes, *, trials: int, client: Client | None = None) -> Findings:
-    """Measures all of it; some 30 s of processor time for 10 robots and 300 steps, 50 trials."""
+    """Measures everything, in some 30 s of processor time for 10 robots and 300 steps, 50
+    trials."""
     genotype = experiment._genotype(genotype)
     trace = experiment.simulate(genotype, TrialSet.evaluation(), trials=trials)
     sensors = _sensors(experiment)
@@ -106,7 +108,7 @@ def findings(experiment: Experiment, genotype: Genes, *, trials: int, client: Cl
 
 
 def states(trace: Trace) -> dict[str, Codes]:
-    """What there is to tell of a sender, as codes ``[T, steps, R]``."""
+    """Properties of a sender that a message may reveal, as codes ``[T, steps, R]``."""
     named = zip(trace.stimulus_names, np.moveaxis(trace.stimuli, -1, 0))
     return {
         "its LED": trace.leds.astype(np.int64),
@@ -117,7 +119,7 @@ def states(trace: Trace) -> dict[str, Codes]:
 
 
 def responses(trace: Trace) -> dict[str, Codes]:
-    """What a hearer may do, as codes ``[T, steps, R]``."""
+    """Actions of a hearer, as codes ``[T, steps, R]``."""
     return {
         "its LED": trace.leds.astype(np.int64),
         "whether it sends": trace.sends.astype(np.int64),
@@ -141,7 +143,7 @@ def _input(experiment: Experiment, genotype: Floats, trace: Trace, sensor: str) 
     blind = variant(experiment, without=sensor)
     fitness = blind.evaluate(genotype, TrialSet.evaluation(), trials=len(trace.fitness))
     values = trace.stimuli[:, FIRST:, :, input_columns(experiment, sensor)]
-    # A reading of the radio is zeros without a frame.
+    # Without a frame, the readings of the radio are zeros.
     there = trace.frame_emitters[:, FIRST:] >= 0 if sensor.startswith("wireless_receiver") else np.isfinite(values).all(axis=-1)
     rows = values[there & np.isfinite(values).all(axis=-1)]
     counts = np.unique(rows, axis=0, return_counts=True)[1] if len(rows) else np.array([0])
@@ -152,4 +154,4 @@ def _lesions(experiment: Experiment, genotype: Floats, of: str, trials: int, cli
     try:
         return ablation(experiment, genotype, "groups" if of == "groups" else "neurons", trials=trials, client=client)
     except ValueError:
-        return []  # weights that no gene silences cannot be taken away
+        return []  # Weights that no gene sets to 0 cannot be removed.

@@ -1,4 +1,5 @@
-"""Under other conditions than those of evolution: trials, sizes, densities, ranges, noise, time steps."""
+"""Fitness under other conditions than those of evolution: trials, sizes, densities, ranges, noise, time
+steps."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from .variants import Config, evolved_robots, resize, spread_out
 from ..representation import short
 
 TRIALS_OF = TrialSet.generation_of(1_000_000)
-"""Trials that no run gets to, and that a fleet computes, too: the same bits there and here."""
+"""Trials that no run reaches, and that a fleet can compute: the same bits there and here."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +28,16 @@ class Condition:
     """The fitness of a genotype under one condition."""
 
     what: str
-    """What is changed, such as ``robots``; empty for the experiment as it is."""
+    """The changed property, such as ``robots``; empty for the unchanged experiment."""
     value: float
-    """Its value; NaN for the experiment as it is."""
+    """Its value; NaN for the unchanged experiment."""
     mean: float
     """Mean fitness over the trials; NaN if there is no such experiment."""
     ci95: tuple[float, float]
     """Mean ± 1.96 standard errors."""
     problem: str = ""
-    """Why there is no such experiment: a swarm that does not fit into its world, say."""
+    """The reason why there is no such experiment, for example a swarm that does not fit into its
+    world."""
 
     __repr__ = short
 
@@ -43,13 +45,13 @@ class Condition:
 def generalisation(
     experiment: Experiment, genotype: Genes, *, trials: int = 50, client: Client | None = None
 ) -> list[Condition]:
-    """Fitness under every condition that the experiment has: as it is; in other sets of as many trials; with
-    half to five times as many robots, in the same world and in one that grows with them; as many robots
-    closer together or farther apart; with other reaches of its sensors and its radio, other noise of its light
-    and distance sensors (where they have any), and other steps of its wheels.
+    """Fitness under every condition that applies to the experiment: unchanged; in other sets of as many
+    trials; with half to five times as many robots, in the same world and in one that grows with them; with as
+    many robots closer together or farther apart; with other reaches of its sensors and its radio, other noise
+    of its light and distance sensors (if they have any), and other steps of its wheels.
 
-    But for the other sets, all in trials with the same numbers, which had no part in evolution. ``client``:
-    evaluate on its fleet.
+    Except for the other sets, all conditions have the same trials, which had no part in evolution.
+    ``client``: evaluate on its fleet.
     """
     trials = arguments.whole(trials, "trials", 2, TRIALS_MAX)
     genes = experiment._genotype(genotype)[np.newaxis]
@@ -69,7 +71,7 @@ def generalisation(
 
 
 SETS = "set of trials"
-"""The set of the experiment as it is has number 1."""
+"""The set of the unchanged experiment has number 1."""
 
 
 def _conditions(config: Config) -> Iterator[tuple[str, float, Config]]:
@@ -86,7 +88,8 @@ def _conditions(config: Config) -> Iterator[tuple[str, float, Config]]:
             if grows:
                 spread_out(changed, (n / was) ** 0.5)
             yield what, n, changed
-    # A random graph has distances of its own: the reach of the radio, below, is its density.
+    # A random graph sets the distances itself: the reach of the radio, below, determines its
+    # density.
     if robots["initializers"]["positions"]["name"] != "random_graph":
         for density in (0.25, 0.5, 2, 4):
             changed = deepcopy(config)

@@ -1,4 +1,4 @@
-"""Information between discrete variables, and how much of it chance alone gives."""
+"""Information between discrete variables, and the amount that chance alone gives."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def codes(*columns: ArrayLike) -> Codes:
 
 
 def discretise(values: ArrayLike, n_bins: int = 4) -> Codes:
-    """Real values to ``n_bins`` bins that hold about equally many; NaN to -1.
+    """Maps real values to ``n_bins`` bins of about equal counts, and NaN to -1.
 
-    Values that are all alike, or take fewer than ``n_bins`` different ones, keep these.
+    If there are fewer than ``n_bins`` different values, each gets its own bin.
     """
     n_bins = arguments.whole(n_bins, "n_bins", 1)
     array = np.asarray(values, dtype=np.float64)
@@ -46,17 +46,17 @@ def entropy(values: ArrayLike) -> float:
 
 
 def mutual_information(x: ArrayLike, y: ArrayLike) -> float:
-    """Mutual information of two arrays of one shape, in bits, of their frequencies.
+    """Mutual information of two arrays of one shape, in bits, from their frequencies.
 
-    Of few values it is too large by about (A - 1)(B - 1) / (2 N ln 2) (Miller 1955), where A and B
-    are the numbers of different values: :func:`dependence` has the level of chance beside it.
+    With few values it is too large by about (A - 1)(B - 1) / (2 N ln 2) (Miller 1955), where A and
+    B are the numbers of different values: :func:`dependence` adds the level of chance.
     """
     a, b = codes(x).reshape(-1), codes(y).reshape(-1)
     return _information(a, b, int(b.max(initial=0)) + 1)
 
 
 def _information(a: Codes, b: Codes, n_b: int) -> float:
-    """Of two lists of codes from 0, those of ``b`` below ``n_b``."""
+    """Mutual information of two lists of codes from 0, those of ``b`` below ``n_b``."""
     if a.size == 0:
         return 0.0
     counts = np.bincount(a * n_b + b)
@@ -69,16 +69,16 @@ def _information(a: Codes, b: Codes, n_b: int) -> float:
 
 @dataclass(frozen=True)
 class Dependence:
-    """How much two variables tell of each other."""
+    """The information between two variables."""
 
     bits: float
-    """Mutual information, as it was counted."""
+    """Measured mutual information."""
     chance: float
-    """Its mean where nothing but chance relates them."""
+    """Its mean if only chance relates them."""
     chance95: float
-    """It exceeds this in 2.5 % of what chance gives."""
+    """Chance exceeds this value with a probability of 2.5 %."""
     p: float
-    """Share of what chance gives that is as large, at least 1 / (shuffles + 1)."""
+    """Share of shuffles with at least as much information, at least 1 / (shuffles + 1)."""
 
     @property
     def excess(self) -> float:
@@ -91,9 +91,9 @@ class Dependence:
 def dependence(x: ArrayLike, y: ArrayLike, *, shuffles: int = 200, seed: int = 0) -> Dependence:
     """Mutual information of two arrays ``[T, ...]`` of one shape, against chance.
 
-    Negative codes are missing values; places where either is missing do not count. For chance,
-    the trials of ``y`` change places, so that both variables keep their course in time: shuffled
-    single values would find dependence in whatever changes slowly.
+    Negative codes are missing values; positions with either missing do not count. For chance, the
+    trials of ``y`` are shuffled, so that both variables keep their course in time: shuffled single
+    values would suggest dependence in all slow variables.
     """
     shuffles = arguments.whole(shuffles, "shuffles", 0)
     seed = arguments.whole(seed, "seed", 0)
@@ -119,7 +119,7 @@ def dependence(x: ArrayLike, y: ArrayLike, *, shuffles: int = 200, seed: int = 0
 
 
 def _moved(rng: np.random.Generator, n: int) -> NDArray[np.intp]:
-    """A random order in which nobody keeps its place: Sattolo's cycle."""
+    """A random order in which no element keeps its place: Sattolo's cycle."""
     order = np.arange(n)
     for i in range(n - 1, 0, -1):
         j = rng.integers(i)

@@ -26,7 +26,7 @@ figure { margin: 0.8rem 0; }
 
 
 class Page:
-    """What a report says, in order."""
+    """The content of a report, in order."""
 
     def __init__(self, title: str, directory: Path) -> None:
         self.title = title
@@ -41,7 +41,7 @@ class Page:
         self._body.append(f"<p>{html.escape(text)}</p>")
 
     def note(self, text: str) -> None:
-        """What a reader has to know to read what is above."""
+        """A note that explains the table or figure above it."""
         self._body.append(f'<p class="note">{html.escape(text)}</p>')
 
     def sentences(self, name: str, sentences: Sequence[str]) -> None:
@@ -62,7 +62,7 @@ class Page:
     def figure(self, figure: Figure) -> None:
         """A figure of Matplotlib, as SVG within the page."""
         file = io.StringIO()
-        # Without a date and with names that are counted, the same report is the same file.
+        # Without a date and with counted names, the same report gives the same file.
         figure.savefig(file, format="svg", bbox_inches="tight", metadata={"Date": None})
         svg = file.getvalue()
         self._body.append(f"<figure>{svg[svg.index('<svg') :]}</figure>")

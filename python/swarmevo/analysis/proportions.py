@@ -16,11 +16,11 @@ class Proportion:
     """A share of rows."""
 
     share: float
-    """NaN if no row counts."""
+    """The share; NaN if no row counts."""
     error: float
     """Its standard error over trials; NaN for fewer than two."""
     rows: int
-    """How many rows count."""
+    """Number of counted rows."""
 
     @property
     def ci95(self) -> tuple[float, float]:
@@ -31,11 +31,11 @@ class Proportion:
 
 
 def proportion(event: ArrayLike, where: ArrayLike | None = None) -> Proportion:
-    """Share of true values of an array ``[T, ...]``, of those places where ``where`` is true.
+    """Share of true values of an array ``[T, ...]``, among the places where ``where`` is true.
 
     Its error is that of a ratio over trials (Cochran, Sampling Techniques 1977, eq. 2.39), which
-    are independent. The thesis's Eq. 6.1 takes every row of a trial for independent, and is too
-    narrow for it.
+    are independent. The thesis's Eq. 6.1 treats every row of a trial as independent, so its
+    interval is too narrow.
     """
     events = np.asarray(event, dtype=bool)
     counts = np.ones(events.shape, bool) if where is None else np.asarray(where, dtype=bool)

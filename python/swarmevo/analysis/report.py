@@ -1,4 +1,4 @@
-"""How does it do it? A report on one genotype."""
+"""A report on how one genotype solves its task."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def report(
 ) -> Path:
     """Writes ``report.html`` and its tables as CSV to ``directory``; returns the page's path.
 
-    ``trials`` episodes of the set of evaluations are simulated, which had no part in evolution, and
-    as many for every input and every part of the network that is taken away. Other conditions and lesions are
-    evaluated on the fleet of ``client``, if there is one. Needs SciPy and Matplotlib (``analysis``, ``plot``).
-    Raises ``ValueError`` for one trial, which has no intervals, and :class:`~swarmevo.OtherExperimentError` for a
-    champion of another experiment; a report on one under changed conditions takes its ``genotype``.
+    The function simulates ``trials`` episodes of the set of evaluations, which had no part in evolution, and
+    as many for every removed input and part of the network. If ``client`` is given, its fleet evaluates other
+    conditions and lesions. Needs SciPy and Matplotlib (``analysis``, ``plot``). Raises ``ValueError`` for one
+    trial, which has no intervals, and :class:`~swarmevo.OtherExperimentError` for a champion of another
+    experiment; for a report under changed conditions, give its ``genotype``.
     """
     trials = arguments.whole(trials, "trials of a report, which need intervals: their number", 2, TRIALS_MAX)
     found = findings(experiment, genotype, trials=trials, client=client)
@@ -69,10 +69,10 @@ def _inputs(page: Page, found: Findings) -> None:
     for it in found.inputs:
         change = mean(it.change) if it.change.any() else "the same bits"
         rows.append([it.sensor, mean(it.fitness), change, f"{100 * it.usual:.1f} %"])
-    page.table("inputs", ["input that is 0", "fitness", "change, in the same trials", "says the same in"], rows)
+    page.table("inputs", ["input that is 0", "fitness", "change, in the same trials", "most frequent value in"], rows)
     page.note(
         "Mean over trials with its 95 % interval. The same worlds and noise with and without the input. "
-        "Last: how often its most frequent value comes, where it says anything."
+        "Last column: share of its most frequent value among its readings."
     )
 
 
@@ -83,7 +83,7 @@ def _conditions(page: Page, conditions: list[Condition]) -> None:
         for it in conditions
     ]
     page.table("conditions", ["changed", "to", "fitness", "from", "to (95 %)"], rows)
-    page.note("Mean over trials that have the same numbers in all rows but those of other sets, and its 95 % interval.")
+    page.note("Mean over trials, the same in all rows except those of other sets, with its 95 % interval.")
 
 
 def _ends(condition: Condition) -> list[object]:
@@ -96,7 +96,7 @@ def _channel(page: Page, found: Findings) -> None:
     page.heading("What is said")
     page.text(
         f"From step {FIRST} on, {100 * use.sends:.1f} % of robots send their own message, the others relay; "
-        f"{100 * use.hears:.1f} % hear something. What is sent has {use.entropy:.2f} bits."
+        f"{100 * use.hears:.1f} % hear something. The sent messages have {use.entropy:.2f} bits."
     )
     code = symbols(trace)
     sends = trace.sends[:, FIRST:]
@@ -112,12 +112,12 @@ def _channel(page: Page, found: Findings) -> None:
         modes = [[name, percent(by_mode.get(mode))] for mode, name in enumerate(("relay", "send"))]
         page.table("modes", ["mode", "LED on"], modes)
     hops = [[i + 1, f"{100 * part:.1f} %", cm] for i, (part, cm) in enumerate(zip(words.shares, words.distances))]
-    page.table("hops", ["emissions until heard", "share of frames", "cm from who said it"], hops)
+    page.table("hops", ["emissions until heard", "share of frames", "cm from its sender"], hops)
     page.note("± standard errors over trials.")
     figure, axes = canvas(4.2, 3.6)
     shown = axes.imshow(informants(trace), cmap="Blues", vmin=0)
-    axes.set(xlabel="robot that said it first", ylabel="robot that hears it", title="Who informs whom")
-    figure.colorbar(shown, label="share of what is heard")
+    axes.set(xlabel="robot that first sent it", ylabel="robot that hears it", title="Who informs whom")
+    figure.colorbar(shown, label="share of heard messages")
     page.figure(figure)
 
 
@@ -151,9 +151,9 @@ def _counterfactuals(page: Page, found: Findings) -> None:
             effects = _effects(of.leds[of.sensed], of.fitness[of.sensed])
             rows.append([f"{sensor}, for one step", int(of.sensed.sum()), f"{own:.1f} %", f"{others:.1f} %", *effects])
     if not rows:
-        page.text("There is nothing to replace by zeros.")
+        page.text("No reading can be replaced by zeros.")
         return
-    page.table("counterfactuals", ["made 0", "times", "itself does otherwise", "others do", "LED otherwise, steps", "fitness"], rows)
+    page.table("counterfactuals", ["made 0", "times", "own actions differ", "others do", "LED differs, steps", "fitness"], rows)
     page.note(
         "One at a time, with all noise as it was: what differs by a bit within 10 steps was caused by it. LED: "
         "of others for a message, its own for what is sensed."
@@ -163,7 +163,7 @@ def _counterfactuals(page: Page, found: Findings) -> None:
     figure, axis = canvas(8, 2.6)
     shown = axis.imshow(it.reached[0].T, aspect="auto", interpolation="nearest", cmap="Oranges", vmin=0)
     axis.set_xticks(range(len(it.steps))[::2], [str(step) for step in it.steps[::2]])
-    axis.set(xlabel="step in which the message was replaced", ylabel="robot that said it", title="Robots that then acted otherwise, first episode")
+    axis.set(xlabel="step in which the message was replaced", ylabel="robot that sent it", title="Robots whose actions then differ, first episode")
     figure.colorbar(shown)
     page.figure(figure)
 

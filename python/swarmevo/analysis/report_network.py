@@ -1,4 +1,4 @@
-"""The part of a report that takes the network apart."""
+"""The part of a report on the network."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .page import Page
 from .wording import attractor, bifurcations, message
 
 SHOWN = 10
-"""Lesions that a table has of each kind, from the worst on."""
+"""Number of lesions of each kind in a table, the worst first."""
 
 
 def network(page: Page, found: Findings) -> None:
-    """Lesions, synapses, states in episodes, and, of rate neurons, the network alone."""
+    """Lesions, synapses, states in episodes, and, for rate neurons, the isolated network."""
     whole = found.experiment.network(found.genotype)
     page.heading("What each part of the network is worth")
     for of, lesions in found.lesions.items():
@@ -27,7 +27,7 @@ def network(page: Page, found: Findings) -> None:
             for it in lesions
         ]
         page.table(f"lesions-{of}", [f"without ({of})", "synapses", "fitness", "change (95 %)"], rows, shown=SHOWN)
-    page.note(f"Weights of 0, all noise as it was. The {SHOWN} that are missed most; the CSV files have all.")
+    page.note(f"Weights of 0, with the same noise. The {SHOWN} largest losses; the CSV files have all.")
     _synapses(page, whole)
     _states(page, found)
     if found.settled:
@@ -90,7 +90,7 @@ def _alone(page: Page, found: Findings, whole: Network) -> None:
         for it in found.settled
     ]
     outputs = list(found.settled[0].outputs)
-    page.table("attractors", [", ".join(whole.inputs), "share of steps", "the state goes", *outputs], rows)
+    page.table("attractors", [", ".join(whole.inputs), "share of steps", "the state settles", *outputs], rows)
     alone, first = CTRNN.of(whole), found.settled[0].inputs
     ways = []
     for it in found.settled[1:]:
@@ -99,9 +99,9 @@ def _alone(page: Page, found: Findings, whole: Network) -> None:
         ways.append([message(it.inputs.tolist()), points[0], points[1], bifurcations(branches)])
     page.table("continuation", [f"from {message(first.tolist())} to", "points that attract there", "and here", "on the way"], ways)
     page.note(
-        "Inputs that are held, by frequency, rounded to 0.1, and the rates of the outputs' neurons where the state goes. On the way: "
+        "Constant inputs, by frequency, rounded to 0.1, and the rates of the outputs' neurons where the state settles. On the way: "
         "where equilibria that are followed from either end meet (fold) or begin to go round (Hopf), as a share of it. Episodes "
-        "change inputs faster than a network settles: what it does in between is in the states above."
+        "change inputs faster than a network settles: the states above show its course in between."
     )
 
 

@@ -1,4 +1,4 @@
-"""Where a network settles under the inputs that occur in episodes, while they are held."""
+"""The states where a network settles under constant inputs that occur in episodes."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Settled:
-    """What the network does alone, from a state of zeros, under one input that is held."""
+    """The behaviour of an isolated network, from a state of zeros, under one constant input."""
 
     inputs: Floats
     """``[I]``, rounded to 0.1."""
     share: float
-    """Of robots and steps that have it."""
+    """Share of robots and steps with this input."""
     attractor: Equilibrium | LimitCycle | None
-    """Where its state goes; None if, after 100 of the slowest time constants, it neither rests nor goes round."""
+    """The attractor of its state; None if, after 100 of the slowest time constants, it neither rests nor
+    cycles."""
     outputs: dict[str, tuple[float, float]]
-    """Least and largest rate of each neuron of an output there."""
+    """Minimum and maximum rate of each neuron of an output there."""
 
     __repr__ = short
 
 
 def settled(experiment: Experiment, genotype: Genes, trace: Trace, most: int = 6) -> list[Settled]:
-    """For the ``most`` inputs that come most often from step 10 on; nothing for networks of other
-    neurons than ``rate_model``."""
+    """For the ``most`` most frequent inputs from step 10 on; empty for networks of other neurons
+    than ``rate_model``."""
     most = arguments.whole(most, "most", 0)
     network = experiment.network(genotype)
     if network.description["neuron_model"] != "rate_model":
@@ -54,7 +55,7 @@ def settled(experiment: Experiment, genotype: Genes, trace: Trace, most: int = 6
 
 
 def _frequent_inputs(trace: Trace, n_inputs: int, most: int) -> tuple[Floats, Floats]:
-    """The inputs ``[most, I]`` that come most often, and their shares."""
+    """The most frequent inputs ``[most, I]``, and their shares."""
     active = ~np.isnan(trace.activities[0, 0, :, 0])
     stimuli = trace.stimuli[:, FIRST:, active, :n_inputs].reshape(-1, n_inputs).astype(np.float64)
     distinct, counts = np.unique(stimuli.round(1) + 0.0, axis=0, return_counts=True)

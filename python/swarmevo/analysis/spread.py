@@ -1,4 +1,4 @@
-"""How words spread: from whom, how far, how fast."""
+"""The spread of words: their senders, distances and speeds."""
 
 from __future__ import annotations
 
@@ -17,25 +17,26 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spread:
-    """What became of the words of a swarm. A *word* is what a robot says in one step; H are hops, from 1."""
+    """The spread of the words of a swarm. A *word* is a message that a robot sends in one step; H are hops,
+    from 1."""
 
     shares: Floats
-    """``[H]``: of what is heard, the share that has made so many hops."""
+    """``[H]``: the share of heard messages by number of hops."""
     distances: Floats
-    """``[H]``: mean distance of hearers from the robot that said it first, cm; NaN where nothing was heard."""
+    """``[H]``: mean distance between hearers and the original sender, cm; NaN if no message was heard."""
     words: int
-    """How many words were heard by anybody."""
+    """Number of words that any robot heard."""
     hearers: float
-    """Robots that hear a word, on average over these words."""
+    """Mean number of robots that hear such a word."""
     farthest: int
-    """The most robots that heard one word."""
+    """Maximum number of robots that heard one word."""
     longest: int
-    """The most steps that a word was heard after it had been said."""
+    """Maximum number of steps between sending and hearing a word."""
 
     @property
     def speed(self) -> float:
-        """How fast words spread, cm per step: the slope of the distance over hops, one of which takes a step,
-        by least squares weighted by what was heard; NaN if all made equally many."""
+        """Speed of words, cm per step: the slope of distance over hops, each of which takes a step, by least
+        squares weighted by the number of heard messages; NaN if all made equally many hops."""
         there = self.shares > 0
         if there.sum() < 2:
             return float("nan")
@@ -46,8 +47,8 @@ class Spread:
 
 
 def spread(trace: Trace, first: int = FIRST) -> Spread:
-    """Of what was heard from step ``first`` on. A frame of h hops was said h steps before by its
-    originator, so that frames of one originator and that step carry the same word."""
+    """The spread of messages heard from step ``first`` on. The originator of a frame of h hops
+    sent it h steps before, so frames of one originator and that step carry the same word."""
     first = arguments.whole(first, "first", 0)
     world = trace.experiment.to_dict()["world"]
     size = np.array([world["width"], world["height"]], np.float64)
@@ -62,7 +63,7 @@ def spread(trace: Trace, first: int = FIRST) -> Spread:
     counts = np.bincount(hops, minlength=most + 1)[1:]
     sums = np.bincount(hops, weights=distance, minlength=most + 1)[1:]
     said = step - hops
-    # Who hears a word twice, from two that relay it, is one hearer.
+    # A robot that hears a word from two relays counts once.
     hearers = np.unique(np.stack([trial, said, origin, hearer], axis=-1), axis=0)
     words, times = np.unique(hearers[:, :3], axis=0, return_counts=True)
     with np.errstate(invalid="ignore"):

@@ -20,16 +20,17 @@ class Components:
     """Principal components of the activities of N neurons."""
 
     shares: Floats
-    """``[N]``: of the variance, largest first."""
+    """``[N]``: shares of the variance, largest first."""
     axes: Floats
     """``[N, N]``: a component per row, of length 1; its largest entry is positive."""
     scores: Floats
-    """``[T, steps, R, N]``: where the state is on each component; NaN of robots without a network."""
+    """``[T, steps, R, N]``: projection of the state on each component; NaN for robots without a
+    network."""
 
     @property
     def dimension(self) -> float:
-        """How many components it takes: (sum of variances)² / sum of their squares (the participation ratio,
-        Gao et al. 2017), from 1 to N; 0 of states that never change."""
+        """Effective number of components: (sum of variances)² / sum of their squares (the participation
+        ratio, Gao et al. 2017), from 1 to N; 0 for constant states."""
         squares = float((self.shares**2).sum())
         return 1 / squares if squares > 0 else 0.0
 
@@ -37,7 +38,7 @@ class Components:
 
 
 def components_of_states(trace: Trace, first: int = FIRST) -> Components:
-    """Of all robots with a network, in all trials, from step ``first`` on."""
+    """The states of all robots with a network, in all trials, from step ``first`` on."""
     first = arguments.whole(first, "first", 0)
     states = np.asarray(trace.activities[:, first:], np.float64)
     active = ~np.isnan(states).any(axis=-1)

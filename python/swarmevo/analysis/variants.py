@@ -1,4 +1,4 @@
-"""The same experiment with something changed."""
+"""Variants of an experiment."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def variant(
     perturbations: Config | None = None,
 ) -> Experiment:
     """The experiment with another number of ``robots`` (and the same share of affected ones), of
-    ``steps``, with an input that is 0 (``without``: a sensor, such as ``wireless_receiver:msg``), and
-    with other ``perturbations`` than those of the file. What is absent stays as it is.
+    ``steps``, with an input of 0 (``without``: a sensor, such as ``wireless_receiver:msg``), and with
+    other ``perturbations`` than those of the file. Absent arguments change nothing.
 
     Conditions with the same number of robots have the same worlds and the same noise.
     """
@@ -56,8 +56,8 @@ def resize(robots: Config, n: int) -> None:
 
 
 def spread_out(config: Config, factor: float) -> None:
-    """Makes the world, and the places where everything starts, ``factor`` times as long and as wide. Reaches,
-    speeds and the ways of lights stay as they were, and so do the distances within a random graph."""
+    """Makes the world and all starting places ``factor`` times as long and as wide. Reaches, speeds, the
+    paths of lights and the distances within a random graph do not change."""
     world = config["world"]
     world["width"], world["height"] = factor * world["width"], factor * world["height"]
     for it in world["objects"].values():
@@ -67,7 +67,7 @@ def spread_out(config: Config, factor: float) -> None:
 
 
 def inhibit(robots: Config, sensor: str) -> None:
-    """Makes one input of these robots 0, beside those that are 0 already."""
+    """Sets one more input of these robots to 0."""
     perturbations = robots.setdefault("perturbations", {})
     before = perturbations.get("stimuli_inhibition", [])
     before = before if isinstance(before, list) else [before]

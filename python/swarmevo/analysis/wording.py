@@ -1,4 +1,4 @@
-"""Numbers as a report says them."""
+"""The notation of numbers in a report."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ def share(value: float) -> str:
 
 
 def attractor(it: Equilibrium | LimitCycle | None) -> str:
-    """Where a state goes."""
+    """The attractor of a state."""
     if isinstance(it, Equilibrium):
         return "to a point"
-    return f"round in {it.period:.1f}" if isinstance(it, LimitCycle) else "neither to rest nor round, as far as was followed"
+    return f"round in {it.period:.1f}" if isinstance(it, LimitCycle) else "neither rest nor cycle within the followed time"
 
 
 def bifurcations(branches: Sequence[Branch]) -> str:
-    """What happens to equilibria along a way, in its order."""
+    """The bifurcations along a way, in its order."""
     found = sorted((it for branch in branches for it in branch.bifurcations), key=lambda it: it.share)
     return ", ".join(f"{'Hopf' if it.kind == 'hopf' else 'fold'} at {it.share:.2f}" for it in found) or "none"
 

@@ -1,4 +1,4 @@
-"""Fig. 2.2 and 2.3: what inputs do to the attractors of two neurons."""
+"""Fig. 2.2 and 2.3: the effect of inputs on the attractors of two neurons."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ NETWORKS = {
 PATTERNS = ((0, 0), (0, 1), (1, 0), (1, 1))
 DT = 1 / 20
 HELD = 100
-"""Time constants for which each pattern is held: more than three rounds of the cycles."""
+"""Duration of each pattern, in time constants: more than three periods of the cycles."""
 WAYS = {"a": ((0, 1), (1, 1), "a"), "b": ((1, 1), (0, 0), "c")}
-"""Fig. 2.3, whose networks the thesis does not give: first and last inputs, and which network of Fig. 2.2."""
+"""Fig. 2.3: first and last inputs, and a network of Fig. 2.2, because the thesis does not give those of Fig.
+2.3."""
 START = (0.1, 0.0)
 
 

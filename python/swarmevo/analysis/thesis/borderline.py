@@ -89,7 +89,7 @@ def fig_15(champion: Champion) -> Figure:
 
 
 def fig_16(champion: Champion) -> Figure:
-    """Targets and LEDs of a swarm that is placed anew every 200 steps."""
+    """Targets and LEDs of a swarm that gets new places every 200 steps."""
     trace = champion.trace(1, steps=STEPS, perturbations=SWITCH)
     figure, axes = canvas(8, 2.9, 1, 2)
     raster(axes[0], trace.targets[0] > 0, "black: should be on")
@@ -98,7 +98,7 @@ def fig_16(champion: Champion) -> Figure:
 
 
 def fig_17(champion: Champion) -> Figure:
-    """As Fig. 6.15, placed anew every 200 steps."""
+    """Like Fig. 6.15, with new places every 200 steps."""
     changes = {"steps": STEPS, "perturbations": SWITCH}
     return _accuracy({f"{n} robots": champion.measure(robots=n, **changes).measures["accuracy"] for n in SIZES})
 
@@ -120,14 +120,14 @@ def fig_18(champion: Champion) -> Figure:
 
 
 def fig_19(champion: Champion) -> Figure:
-    """LED on, by the number of directions from which something was heard within ten steps."""
+    """LED on, by the number of directions from which a robot heard frames within ten steps."""
     trace = champion.trace()
     found = conditional(trace.leds[:, FIRST:] > 0, sectors_heard(trace)[:, FIRST:])
     figure, axis = canvas(4.6, 2.9)
     numbers = range(1, trace_sectors(champion) + 1)
     nothing = Proportion(float("nan"), float("nan"), 0)
     bars(axis, [str(n) for n in numbers], [found.get(n, nothing) for n in numbers])
-    axis.set(xlabel="directions from which it heard something", ylabel="% with the LED on")
+    axis.set(xlabel="directions from which it heard frames", ylabel="% with the LED on")
     return figure
 
 

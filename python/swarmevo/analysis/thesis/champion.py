@@ -1,4 +1,4 @@
-"""A champion, and what it does under other conditions."""
+"""A champion, and its behaviour under other conditions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Champion:
 
     @cached_property
     def experiment(self) -> Experiment:
-        """As it was evolved."""
+        """The experiment of its evolution."""
         experiment = Experiment.from_file(self.configs / f"{self.name}_snes.json", self.seed)
         experiment.check(self._evolved)
         return experiment
@@ -78,10 +78,10 @@ class Champion:
 
 
 def mean_of_trials(values: Floats) -> Proportion:
-    """The mean of a share ``[T]`` that every trial has, with its standard error over trials."""
+    """The mean of a share ``[T]`` of each trial, with its standard error over trials."""
     error = float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
     return Proportion(float(values.mean()), error, len(values))
 
 
 REACH = 100.0
-"""Of the radio in all experiments, cm."""
+"""Reach of the radio in all experiments, cm."""

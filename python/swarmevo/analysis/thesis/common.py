@@ -1,4 +1,4 @@
-"""What the figures of several experiments have in common."""
+"""Common parts of the figures of several experiments."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def snapshots(
     show_headings: bool = False,
     arrows: float = 9,
 ) -> tuple[Figure, Any]:
-    """The swarm of the first trial after these steps, in two rows; ``colours`` ``[steps, R]`` says who is
-    orange. All panels have the same frame, that of all robots in these steps."""
+    """The swarm of the first trial after these steps, in two rows; ``colours`` ``[steps, R]`` selects the
+    orange robots. All panels have the same frame, that of all robots in these steps."""
     figure, axes = canvas(7, 4.6, 2, (len(steps) + 1) // 2)
     positions = trace.positions[0]
     shown = positions[list(steps)].reshape(-1, 2)

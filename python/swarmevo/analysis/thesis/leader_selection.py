@@ -50,7 +50,7 @@ def fig_4(champion: Champion) -> Figure:
 
 def fig_5(champion: Champion) -> Figure:
     """LEDs of 20 robots whose leaders fail."""
-    return _leds(champion.trace(1, robots=20, perturbations=FAILURE), "20 robots; who has led alone for 50 steps fails")
+    return _leds(champion.trace(1, robots=20, perturbations=FAILURE), "20 robots; a robot that has led alone for 50 steps fails")
 
 
 def fig_6(champion: Champion) -> Figure:
@@ -92,7 +92,7 @@ def fig_8(champion: Champion) -> Figure:
 
 
 def fig_9(champion: Champion) -> Figure:
-    """The swarm, who sends, and what is sent."""
+    """The swarm, its senders, and their messages."""
     trace = champion.trace(1, robots=20, perturbations={})
     figure, axes = canvas(8, 5.2, 2, 2, width_ratios=(1, 1.5))
     leader = np.argmax((trace.leds[0] > 0).sum(axis=0))
@@ -102,7 +102,7 @@ def fig_9(champion: Champion) -> Figure:
     axes[0, 0].set_title("(a) the swarm; orange: led longest")
     raster(axes[0, 1], trace.sends[0], "(b) black: sends its own message")
     _what_is_sent(axes[1, 1], trace)
-    axes[1, 1].set_title("(c) what is sent or relayed")
+    axes[1, 1].set_title("(c) sent or relayed message")
     handles, labels = axes[1, 1].get_legend_handles_labels()
     axes[1, 0].axis("off")
     axes[1, 0].legend(handles, labels, loc="center", title="symbol")
@@ -150,7 +150,7 @@ def _by_size(axis: Axes, champion: Champion, with_faults: bool) -> None:
 
 
 def _what_is_sent(axis: Axes, trace: Trace) -> None:
-    """Own messages of those who send, those heard of those who relay; blank where there is nothing."""
+    """Own messages of senders, heard messages of relays; blank without one."""
     with needs("plot"):
         from matplotlib.colors import ListedColormap
 
@@ -175,7 +175,7 @@ def _what_is_sent(axis: Axes, trace: Trace) -> None:
 
 
 def symbol_name(message: tuple[float, ...]) -> str:
-    """Its values, in thirds where they are."""
+    """Its values, as thirds if they are."""
     return "(" + ", ".join({0: "0", 33: "⅓", 67: "⅔", 100: "1"}.get(round(100 * it), f"{it:.2g}") for it in message) + ")"
 
 

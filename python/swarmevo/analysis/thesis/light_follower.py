@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SIZES = (5, 10, 15, 20)
 RANGE = 80.0
-"""Within which the light is seen, cm."""
+"""Distance within which robots see the light, cm."""
 PLACES = {0: "from the front", 1: "from the left", 2: "from behind", 3: "from the right"}
 
 
@@ -90,7 +90,7 @@ def fig_33(champion: Champion) -> Figure:
 
 
 def fig_34(champion: Champion) -> Figure:
-    """A way of the light on which it was not evolved."""
+    """A path of the light that evolution did not use."""
     trace = other_way(champion).simulate(champion.genotype, TrialSet.evaluation(), trials=1)
     way = trace.lights[0, :, 0]
     figure, axis = canvas(3.6, 3.6)
@@ -101,7 +101,7 @@ def fig_34(champion: Champion) -> Figure:
 
 
 def fig_35(champion: Champion) -> Figure:
-    """Distances to the light with the orbit and with that way."""
+    """Distances to the light on the orbit and on that path."""
     other = other_way(champion).measure(champion.genotype, TrialSet.evaluation(), trials=champion.trials)
     return _both({"orbit, as evolved": champion.measure().measures, "random targets": other.measures})
 
@@ -124,7 +124,7 @@ def fig_36(champion: Champion) -> Figure:
 
 
 def fig_37(champion: Champion) -> Figure:
-    """How robots turn, by where the light is and by where a frame comes from."""
+    """Turns of robots, by the direction of the light and of a frame."""
     trace = champion.trace()
     turns = (trace.wheels[..., 1] - trace.wheels[..., 0])[:, FIRST:]
     light = light_sectors(trace)[:, FIRST:]
@@ -143,7 +143,7 @@ def fig_37(champion: Champion) -> Figure:
 
 
 def other_way(champion: Champion) -> Experiment:
-    """The experiment with a light that goes to random targets (6.4)."""
+    """The experiment with a light that moves to random targets (6.4)."""
     config = champion.experiment.to_dict()
     light = config["world"]["objects"]["light_red"]
     config["world"]["objects"]["light_red"] = {**_without_params(light), "controller": "light_rnd_pos_controller"}
@@ -211,7 +211,7 @@ def _densities(figure: Any, trace: Trace, turns: Floats, is_dark: NDArray[np.boo
 
 
 def _thinned(values: Floats, most: int = 3000) -> Floats:
-    """At most so many, spread evenly."""
+    """At most a number of elements, spread evenly."""
     return np.asarray(values[:: max(1, len(values) // most)], np.float64)
 
 

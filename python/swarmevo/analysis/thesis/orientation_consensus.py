@@ -130,7 +130,7 @@ def fig_27(champion: Champion) -> Figure:
 
 
 def fig_28(champion: Champion) -> Figure:
-    """Symbols that are sent, by whether sender and hearer are aligned."""
+    """Sent symbols, by the alignment of sender and hearer."""
     trace = champion.trace()
     found = symbols(trace)
     receiving, sending = directions(trace)
@@ -140,7 +140,7 @@ def fig_28(champion: Champion) -> Figure:
         shares = [conditional(found.own == code, aligned)[value] for code in range(min(4, len(found.legend)))]
         bars(axis, [symbol_name(it) for it in found.legend[:4]], shares)
         axis.set(title=title, xlabel="symbol")
-    axes[0].set_ylabel("% of what is sent")
+    axes[0].set_ylabel("% of sent messages")
     return figure
 
 
