@@ -1,8 +1,7 @@
 //! The outer border of a set of points: its alpha shape (Edelsbrunner, Kirkpatrick
 //! & Seidel 1983) with holes filled.
 //!
-//! The triangulation decides with exact predicates, so that it is the same on
-//! every machine.
+//! The triangulation uses exact predicates, so it is the same on every machine.
 
 use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
@@ -12,10 +11,10 @@ use crate::torus::Vec2;
 /// tiniest numbers.
 const TINY: f64 = 1e-30;
 
-/// Which points lie on the outer border of the alpha shape, the union of the
-/// Delaunay triangles whose circumradius is less than `radius`: those that the
-/// union does not surround. A point outside of every such triangle is one of
-/// them, unless it lies in a hole. Points at one place share their lot.
+/// Whether each point lies on the outer border of the alpha shape, the union of the Delaunay
+/// triangles with a circumradius below `radius`. These are the points that the union does not
+/// surround. A point outside every such triangle is on the border, unless it lies in a hole.
+/// Points at the same place have the same result.
 pub(crate) fn border(points: &[Vec2], radius: f64) -> Vec<bool> {
     let mut triangulation: DelaunayTriangulation<Point2<f64>> = DelaunayTriangulation::new();
     let coordinate = |x: f64| if x.abs() < TINY { 0.0 } else { x };
@@ -39,7 +38,7 @@ pub(crate) fn border(points: &[Vec2], radius: f64) -> Vec<bool> {
     for edge in triangulation.directed_edges() {
         neighbours[edge.face().index()].push(edge.rev().face().index());
     }
-    // Outside is what can be reached from afar without crossing a solid triangle.
+    // A triangle is outside if a path from infinity reaches it without crossing a solid triangle.
     let mut outside = vec![false; n_faces];
     let mut reached = vec![triangulation.outer_face().index()];
     while let Some(face) = reached.pop() {
@@ -77,7 +76,7 @@ mod tests {
         (0..coordinates.len()).filter(|&index| border[index]).collect()
     }
 
-    /// Squared circumradius and centre of a triangle; none if it is flat.
+    /// Centre and squared circumradius of a triangle; `None` if it is flat.
     fn circumcircle([a, b, c]: [Vec2; 3]) -> Option<(Vec2, f64)> {
         let (b, c) = (Vec2::new(b.x - a.x, b.y - a.y), Vec2::new(c.x - a.x, c.y - a.y));
         let d = 2.0 * (b.x * c.y - b.y * c.x);
@@ -90,8 +89,8 @@ mod tests {
         Some((Vec2::new(a.x + x, a.y + y), x * x + y * y))
     }
 
-    /// The definition, triangle by triangle: of all triples those whose
-    /// circumcircle is empty make the triangulation.
+    /// The definition by brute force: the triples with an empty circumcircle make the
+    /// triangulation.
     fn brute_force(points: &[Vec2], radius: f64) -> Vec<bool> {
         let n = points.len();
         let mut triangles = Vec::new();
@@ -113,7 +112,7 @@ mod tests {
         }
         let edges = |[a, b, c]: [usize; 3]| [(a, b), (a, c), (b, c)];
         let at_edge = |edge| triangles.iter().filter(move |(t, _)| edges(*t).contains(&edge));
-        // Triangles that are not solid and open to the outside, by fixed point.
+        // Triangles that are not solid and connect to the outside, found as a fixed point.
         let mut open: BTreeSet<[usize; 3]> = BTreeSet::new();
         loop {
             let more = triangles.iter().filter(|(t, solid)| {

@@ -1,4 +1,4 @@
-//! Networks at work without robots, for benchmarks and figures. Not part of the interface.
+//! Runs networks without robots, for benchmarks and figures. Not part of the public interface.
 
 use std::hint::black_box;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use crate::simulation::{EvaluateError, Simulation};
 use determinism::Isa;
 use determinism::random::{Purpose, Stream};
 
-/// The network of a genotype, at work without robots.
+/// The network of a genotype, which runs without robots.
 #[derive(Debug)]
 pub struct NetworkLoad {
     state: NetworkState,
@@ -19,7 +19,7 @@ pub struct NetworkLoad {
 }
 
 impl NetworkLoad {
-    /// In `n_lanes` lanes with different stimuli.
+    /// The network in `n_lanes` lanes with different stimuli.
     pub fn new(
         simulation: &Simulation,
         genotype: &[f64],
@@ -51,18 +51,19 @@ impl NetworkLoad {
         self.stimuli.set(input, lane, value as f32);
     }
 
-    /// The activity of a neuron in a lane: of a spiking one, the share of substeps with a spike.
+    /// The activity of a neuron in a lane; for a spiking neuron, the share of substeps with a
+    /// spike.
     pub fn activity(&self, neuron: usize, lane: usize) -> f64 {
         self.state.activity().get(neuron, lane).into()
     }
 
-    /// The voltage of a neuron in a lane, mV; none of rate neurons.
+    /// The voltage of a neuron in a lane, mV; `None` for rate neurons.
     pub fn voltage(&self, neuron: usize, lane: usize) -> Option<f64> {
         self.state.voltages().map(|voltages| voltages.get(neuron, lane).into())
     }
 }
 
-/// Synapses between neurons, and substeps per environment step.
+/// Number of synapses between neurons, and of substeps per environment step.
 pub fn network_size(simulation: &Simulation) -> (usize, u32) {
     let network = &simulation.network;
     let is_recurrent = |synapse: &&crate::network::connections::Synapse| {
@@ -71,8 +72,8 @@ pub fn network_size(simulation: &Simulation) -> (usize, u32) {
     (network.synapses.iter().filter(is_recurrent).count(), network.n_substeps)
 }
 
-/// Does as many multiply-adds of f32 vectors as a processor can, `rounds` times
-/// 12, and returns how many scalar ones that are.
+/// Runs `rounds` times 12 multiply-adds of f32 vectors at full speed, and returns the number of
+/// scalar ones.
 pub fn multiply_adds(isa: Isa, rounds: usize) -> usize {
     struct MultiplyAdds(Range<usize>);
     impl WithSimd for MultiplyAdds {

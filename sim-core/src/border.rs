@@ -1,14 +1,13 @@
-//! Which robots stand at the border of their swarm (section 5.2 of the thesis).
+//! Finds the robots at the border of their swarm (section 5.2 of the thesis).
 
 use crate::alpha_shape;
 use crate::torus::{Torus, Vec2};
 
-/// Robots below which a component has no interior.
+/// Number of robots below which a component has no interior.
 const MIN_WITH_INTERIOR: usize = 4;
 
-/// For each robot whether it lies on the outer border of the alpha shape of its
-/// component; robots less than `range` apart are connected. `alpha`: with the width of the world
-/// as unit of length.
+/// Whether each robot lies on the outer border of the alpha shape of its component; robots less
+/// than `range` apart are connected. `alpha`: in units of 1 / world width.
 pub(crate) fn of_swarm(torus: &Torus, positions: &[Vec2], range: f64, alpha: f64) -> Vec<bool> {
     let mut border = vec![true; positions.len()];
     let mut seen = vec![false; positions.len()];
@@ -29,9 +28,9 @@ pub(crate) fn of_swarm(torus: &Torus, positions: &[Vec2], range: f64, alpha: f64
     border
 }
 
-/// The component of `first`, each robot with its position in the plane relative to
-/// `first`: the sum of displacements along edges, so that a component that
-/// straddles the seam of the torus stays in one piece.
+/// The component of `first`, each robot with its position in the plane relative to `first`.
+/// Positions are sums of displacements along edges, so a component that straddles the seam of the
+/// torus stays in one piece.
 fn unwrap(
     torus: &Torus,
     positions: &[Vec2],

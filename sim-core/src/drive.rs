@@ -14,8 +14,7 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
-    /// Pose after one step with the given actions of the right and left wheel, in
-    /// \[-1, 1\].
+    /// The pose after one step with these actions of the right and left wheel, in \[-1, 1\].
     pub fn advance(
         &self,
         torus: &Torus,

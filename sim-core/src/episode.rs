@@ -1,5 +1,5 @@
-//! Episodes: all trials of one genotype, step by step and side by side, so that
-//! their networks share one pass over the weights.
+//! Simulates all trials of one genotype step by step and side by side, so that their networks
+//! share one pass over the weights.
 
 mod recorder;
 
@@ -16,13 +16,12 @@ use crate::trial::{Trial, encoding_streams};
 use determinism::random::TrialSet;
 use experiment_file::RobotController;
 
-/// Lanes that are simulated side by side: enough to share the weights, few enough
-/// to stay in the cache.
+/// Most lanes side by side: enough to share the weights, few enough to stay in the cache.
 const MAX_LANES: usize = 256;
 
-/// Simulates one episode per trial and shows each of its steps to `recorder`.
-/// `keep_going` is asked before every step, and every few milliseconds of a script; false if it
-/// has said no.
+/// Simulates one episode per trial, and shows each step to `recorder`. Calls `keep_going` before
+/// every step, and every few milliseconds of a script; returns false once that has returned
+/// false.
 pub(crate) fn run(
     simulation: &Simulation,
     phenotype: &Phenotype,
@@ -37,7 +36,7 @@ pub(crate) fn run(
         match run_together(simulation, phenotype, trial_set, trials, first, keep_going, recorder) {
             Ok(true) => {}
             Ok(false) => return Ok(false),
-            // What went wrong may be that it was stopped; it has no result either way.
+            // The error may come from the stop itself; a stopped episode has no result.
             Err(EvaluateError::Script { .. }) if !keep_going() => return Ok(false),
             Err(error) => return Err(error),
         }
@@ -45,7 +44,7 @@ pub(crate) fn run(
     Ok(true)
 }
 
-/// The same of trials that are simulated side by side; the first episode has the number `first`.
+/// Simulates trials side by side; the first episode has the number `first`.
 fn run_together(
     simulation: &Simulation,
     phenotype: &Phenotype,
@@ -69,7 +68,7 @@ fn run_together(
     Ok(true)
 }
 
-/// Parts of the trials that are simulated at once.
+/// Divides the trials into parts to simulate side by side.
 fn side_by_side(simulation: &Simulation, trials: Range<u32>) -> impl Iterator<Item = Range<u32>> {
     let n_at_once = (MAX_LANES / simulation.world.n_robots().max(1)).max(1);
     let end = trials.end;
@@ -130,7 +129,7 @@ pub(crate) struct GroupController<'a> {
     robots: Range<usize>,
     controller: Box<dyn Controller + 'a>,
     stimuli: Lanes,
-    /// Whether it changes with reward.
+    /// Whether it learns from reward.
     is_learning: bool,
 }
 
@@ -166,7 +165,7 @@ impl<'a> GroupController<'a> {
         }
     }
 
-    /// Decides what the group's robots do in this step.
+    /// Decides the actions of the group's robots in this step.
     fn decide(&mut self, trials: &mut [Trial<'_>]) {
         let n_robots = self.robots.len();
         for (index, trial) in trials.iter().enumerate() {

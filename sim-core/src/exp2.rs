@@ -5,10 +5,10 @@ use std::f32::consts::LN_2;
 
 use pulp::Simd;
 
-/// 2^y is computed for |y| up to here; beyond, it stays.
+/// Largest |y|; beyond it, the result stays constant.
 pub(crate) const MAX_EXPONENT: f32 = 63.0;
-/// Adding it rounds to an integer and leaves that integer, plus the bias of
-/// exponents, in the lowest bits.
+/// Adding this constant rounds to an integer, and leaves that integer plus the bias of exponents
+/// in the lowest bits.
 const ROUND: f32 = 12_582_912.0 + 127.0;
 /// Bits of a significand.
 const SIGNIFICAND_BITS: u32 = 23;
@@ -24,7 +24,7 @@ pub(crate) struct Exp2<V> {
     pub f: V,
 }
 
-/// 2^y in parts, from which more than 2^y can be computed without loss.
+/// 2^y in parts, from which other functions than 2^y can be computed without loss.
 #[inline(always)]
 pub(crate) fn exp2_parts<S: Simd>(simd: S, y: S::f32s) -> Exp2<S::f32s> {
     let round = simd.splat_f32s(ROUND);

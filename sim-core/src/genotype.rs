@@ -1,4 +1,4 @@
-//! From genes in \[0, 1\] to the network's parameters (section 3.4.2, Eq. 3.17).
+//! Decodes genes in \[0, 1\] to the network's parameters (section 3.4.2, Eq. 3.17).
 
 mod coverage;
 mod select;
@@ -11,21 +11,21 @@ use coverage::{ParameterCoverage, defaults};
 use experiment_file::{ExperimentConfig, GeneScale};
 use select::select;
 
-/// What each gene means.
+/// The meaning of each gene.
 #[derive(Debug, Clone)]
 pub(crate) struct Codec {
     genes: Vec<Gene>,
-    /// Genes of each population.
+    /// Range of genes of each population.
     segments: Vec<Range<usize>>,
-    /// Values of everything that no gene covers.
+    /// Values of all parameters that no gene covers.
     defaults: Phenotype,
-    /// Neurons whose time constant is not the genotype's, and the time constant.
+    /// Neurons with a fixed time constant, and that time constant.
     fixed_tau: Option<(Vec<usize>, f64)>,
-    /// What no gene covers, in words.
+    /// Descriptions of the parameters that no gene covers.
     uncovered: Vec<String>,
 }
 
-/// One gene: the parameter's value is that of gene * span + low on its scale.
+/// One gene: the parameter's value is gene * span + low, on the parameter's scale.
 #[derive(Debug, Clone, Copy)]
 struct Gene {
     parameter: Parameter,
@@ -34,7 +34,7 @@ struct Gene {
     scale: GeneScale,
 }
 
-/// A value of the network.
+/// A parameter of the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Parameter {
     /// The weight of the synapse of this number.
@@ -46,14 +46,14 @@ enum Parameter {
         /// Number of the neuron.
         neuron: usize,
     },
-    /// The axonal delay of the neuron of this number, or after the last neuron of a node of
-    /// an encoder.
+    /// The axonal delay of the neuron of this number; numbers after the last neuron are nodes of
+    /// encoders.
     Delay(usize),
     /// A, B, C or D of a group of synapses.
     Coefficient {
         /// Number of the group.
         group: usize,
-        /// Which, from 0.
+        /// Index of the coefficient, from 0.
         index: usize,
     },
     /// A weight of a receptive field.
@@ -91,7 +91,7 @@ impl Codec {
                 }
             }
             if genes.len() == first {
-                // Chance has left out every synapse that the queries name.
+                // By chance, none of the named synapses exists.
                 let path = format!("algorithm.populations.{name}.objects");
                 problems.add(path, "nothing to evolve: none of these synapses exist");
             }
@@ -110,17 +110,17 @@ impl Codec {
         self.genes.len()
     }
 
-    /// Genes of each population.
+    /// Range of genes of each population.
     pub fn segments(&self) -> &[Range<usize>] {
         &self.segments
     }
 
-    /// What no gene covers, one line each.
+    /// The parameters that no gene covers, one line each.
     pub fn uncovered(&self) -> &[String] {
         &self.uncovered
     }
 
-    /// Decodes d genes.
+    /// Decodes d genes in \[0, 1\].
     pub fn decode(&self, genotype: &[f64]) -> Phenotype {
         let mut phenotype = self.defaults.clone();
         for (gene, x) in self.genes.iter().zip(genotype) {
@@ -309,7 +309,8 @@ mod tests {
             codec.uncovered()[0],
             format!("synapses:weights:H1-H1: {n} weights stay random")
         );
-        // Bias and gain evolve nowhere, which nobody has forgotten; tau does, in one of five.
+        // No neuron evolves bias and gain, which is intentional; tau evolves in one of five
+        // ensembles.
         assert_eq!(codec.uncovered().len(), 11 + 4);
         assert!(codec.uncovered().contains(&"neurons:tau:OUT_LED stays 2".to_owned()));
         config.topology.motor_tau = Some(0.5);

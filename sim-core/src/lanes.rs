@@ -1,8 +1,8 @@
 //! Matrices whose innermost index is the lane: one lane per simulated robot.
 //!
-//! All robots of all trials of a genotype share one network, so that a weight is
-//! read once and applied to every lane. Rows are padded to whole vectors; the
-//! padding holds values like any other, and no result depends on them.
+//! All robots of all trials of a genotype share one network, so that a weight is read once and
+//! applied to every lane. Rows are padded to whole vectors; no result depends on the values in
+//! the padding.
 
 /// Lanes per row are a multiple of this: one 512-bit vector of f32.
 const PADDING: usize = 16;

@@ -1,4 +1,4 @@
-//! Who leads: the only robot with its LED on, and for how long.
+//! Tracks the leader, the only robot with its LED on, and its term.
 
 /// The sole leader and its term so far.
 #[derive(Debug, Clone, Default)]
@@ -7,17 +7,17 @@ pub(crate) struct Leadership {
     n_steps: u32,
 }
 
-/// A robot that is sole leader in this step.
+/// The sole leader of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Leader {
     /// The robot.
     pub robot: usize,
-    /// Consecutive steps of its sole leadership, this one included.
+    /// Consecutive steps of its sole leadership, including this one.
     pub n_steps: u32,
 }
 
 impl Leadership {
-    /// Takes in the LEDs of one step.
+    /// Observes the LEDs of one step; returns the sole leader, if there is one.
     pub fn observe(&mut self, leds: &[u32]) -> Option<Leader> {
         let sole = sole_leader(leds);
         self.n_steps = if sole.is_some() && sole == self.leader { self.n_steps + 1 } else { 1 };

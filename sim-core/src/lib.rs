@@ -60,15 +60,14 @@
 //!
 //! # Where things are
 //!
-//! [`Simulation::compile`] turns a configuration into a `network`, a codec of
-//! genotypes (`genotype`) and a `world` of `objects`. `episode` steps the trials of
-//! a genotype side by side and shows them to a recorder; `stepping` has somebody else decide; `trial` has the phases of a
-//! step, and `swarm` the state of its robots. A phase is a module each: `senses` and
-//! `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`,
-//! `fitness`. Below everything lie `determinism`'s random streams, `torus`, `neighbours`
-//! (which robots are within reach of each other), and the arithmetic on vectors of
-//! robots: `lanes` are the vectors, `exp2` is what activations are made of. `bench`
-//! opens the kernel to the benchmarks.
+//! [`Simulation::compile`] turns a configuration into a `network`, a codec of genotypes
+//! (`genotype`) and a `world` of `objects`. `episode` steps the trials of a genotype side by side
+//! and shows them to a recorder. In `stepping`, the caller decides the robots' actions. `trial`
+//! has the phases of a step, and `swarm` the state of the robots. Each phase is a module:
+//! `senses` and `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`,
+//! `fitness`. All of them use `determinism`'s random streams, `torus`, `neighbours` (robots
+//! within reach of each other), and the arithmetic on vectors of robots: `lanes` has the vectors,
+//! `exp2` the base of activation functions. `bench` opens the kernel to the benchmarks.
 
 mod alpha_shape;
 #[doc(hidden)]
@@ -117,8 +116,8 @@ pub use starts::{TRYING_TIME_MAX, Tried};
 pub use stepping::{Actions, Policy, StepError, Stepper};
 pub use torus::Vec2;
 
-/// Identifies the function that this crate computes. The version is that of the first release
-/// that computed it: it stays the same in later ones, and so do the digests of runs, which begin
-/// with it. Raise the number after the version whenever any fitness bit may change: coordinator
-/// and workers work together only if they agree on it.
+/// Identifies the function that this crate computes. The version in it is the first release that
+/// computed this function, and stays in later releases, so that the digests of runs, which cover
+/// it, stay, too. Raise the format number whenever any fitness bit may change: coordinator and
+/// workers work together only if their fingerprints are equal.
 pub const FINGERPRINT: &str = "sim-core 0.1.0 format 3";

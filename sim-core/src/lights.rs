@@ -1,4 +1,4 @@
-//! Lights and how they move.
+//! Lights and their motion.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -8,13 +8,13 @@ use experiment_file::{LightController, OrbitConfig, RandomTargetsConfig};
 
 /// Probability per step that an orbiting light turns back.
 const FLIP_PROBABILITY: f64 = 0.01;
-/// Time constant with which an orbit's radius tends to its end, steps.
+/// Time constant with which an orbit's radius approaches its final value, steps.
 const ORBIT_SETTLING: f64 = 50.0;
-/// Within this distance of a robot prey flees, cm.
+/// Distance of a robot within which prey flees, cm.
 const PREY_SIGHT: f64 = 150.0;
-/// Within this distance of a robot prey is caught, cm.
+/// Distance of a robot within which prey is caught, cm.
 const PREY_CATCH: f64 = 30.0;
-/// What prey goes per step, cm.
+/// Distance that prey moves per step, cm.
 const PREY_SPEED: f64 = 3.0;
 
 /// The path of one light in one trial.
@@ -55,7 +55,7 @@ impl LightPath {
         stream: Stream,
     ) -> Self {
         let motion = match *controller {
-            // A script moves it.
+            // A script moves this light.
             LightController::ScriptController {} | LightController::Static {} => Motion::Static,
             LightController::LightOrbitController(config) => {
                 let away = torus.displacement(torus.center(), position);
@@ -71,7 +71,7 @@ impl LightPath {
         Self { stream, motion }
     }
 
-    /// Position after environment step `step`, from the position before, among `robots`.
+    /// The next position after environment step `step`, with robots at `robots`.
     pub fn advance(&mut self, position: Vec2, step: u32, torus: &Torus, robots: &[Vec2]) -> Vec2 {
         match &mut self.motion {
             Motion::Static => position,
@@ -113,8 +113,8 @@ impl LightPath {
     }
 }
 
-/// Where prey goes next: away from the robots that it sees, the nearer the more; straight on
-/// while it sees none; nowhere once it is caught.
+/// The next position of prey: it flees from the robots that it sees, more strongly from near
+/// ones. It moves straight on while it sees none, and stops once it is caught.
 fn flee(
     position: Vec2,
     torus: &Torus,
@@ -276,7 +276,7 @@ mod tests {
         assert!(farthest <= 10.0 && farthest > 9.0, "{farthest}");
     }
 
-    /// The way of prey in a step, among robots.
+    /// The displacement of prey in a step among robots.
     fn way_of_prey(robots: &[Vec2]) -> Vec2 {
         let stream = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
         let mut path =
@@ -294,9 +294,10 @@ mod tests {
         let straight = 3.0 * libm::sqrt(0.5);
         assert_way(way_of_prey(&[at(150.0, 0.0)]), (straight, straight));
         assert_way(way_of_prey(&[at(100.0, 0.0)]), (-3.0, 0.0));
-        // Weights 2/3 and 1/3 of ways (-50, 0) and (0, 100): towards them lies (-1, 1).
+        // Weights 2/3 and 1/3 of displacements (-50, 0) and (0, 100): the robots are towards (-1,
+        // 1).
         assert_way(way_of_prey(&[at(-50.0, 0.0), at(0.0, 100.0)]), (straight, -straight));
-        // Surrounded, it goes on as before.
+        // Surrounded prey keeps its direction.
         assert_way(way_of_prey(&[at(-50.0, 0.0), at(50.0, 0.0)]), (straight, straight));
     }
 

@@ -1,5 +1,5 @@
-//! Which robots are near each other, how far and in which direction. It depends
-//! on positions alone, so it is computed again only when a robot has moved.
+//! Finds robots that are near each other, with distances and directions. This depends only on
+//! positions, so it is recomputed only after a robot has moved.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -10,17 +10,16 @@ use crate::polar;
 use crate::torus::{Torus, Vec2, wrap_angle};
 use determinism::Isa;
 
-/// Swarms up to this size are searched without a grid.
+/// Largest swarm that is searched without a grid.
 const MAX_WITHOUT_GRID: usize = 64;
-/// Robots whose neighbours are found, and then located, together: few enough for what is noted of
-/// them to stay in the cache.
+/// Number of robots to process together, few enough for their scratch data to stay in the cache.
 const N_ROBOTS_AT_ONCE: usize = 128;
-/// Cells per robot, at most: all of them are gone through in every step, however few are occupied.
+/// Most cells per robot, because every step visits all cells, occupied or not.
 const MAX_CELLS_PER_ROBOT: usize = 16;
-/// Cells per axis, at most: memory, not speed.
+/// Most cells per axis, to limit memory.
 const MAX_CELLS: usize = 512;
 
-/// A robot as another one has it nearby.
+/// A neighbour of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Neighbour {
     /// The robot.
@@ -32,36 +31,37 @@ pub(crate) struct Neighbour {
 }
 
 impl Neighbour {
-    /// Direction from it to the other robot.
+    /// Direction from the neighbour to the robot.
     pub fn reverse_bearing(&self) -> f64 {
-        // No direction leads from a point to itself; both see it at 0.
+        // At the same point, both robots see each other in direction 0.
         if self.rho == 0.0 { self.bearing } else { wrap_angle(self.bearing + PI) }
     }
 }
 
-/// The neighbours of every robot, robot by robot, each one's in no particular order.
+/// The neighbours of every robot, robot by robot; the neighbours of one robot are in no
+/// particular order.
 #[derive(Debug, Clone)]
 pub(crate) struct Neighbours {
     /// Distance within which robots are neighbours, cm.
     reach: f64,
-    /// The largest square of such a distance.
+    /// The largest squared distance of neighbours.
     reach_squared: f64,
     found: Found,
     grid: Grid,
 }
 
-/// Who is near whom. There may be room for more.
+/// The lists of neighbours. They may have spare room.
 #[derive(Debug, Clone, Default)]
 struct Found {
-    /// The first neighbour of each robot, and the end.
+    /// Index of each robot's first neighbour, and the end.
     first: Vec<usize>,
-    /// Who they are.
+    /// The neighbours' numbers.
     robots: Vec<u32>,
-    /// How far they are, cm.
+    /// The neighbours' distances, cm.
     rho: Vec<f64>,
     /// Their directions in the world's frame, in \[0, 2 pi).
     bearing: Vec<f64>,
-    /// Scratch: where those that were found last are, cm.
+    /// Scratch: displacements to the neighbours found last, cm.
     away_x: Vec<f64>,
     away_y: Vec<f64>,
 }
@@ -74,12 +74,12 @@ impl Neighbours {
         Self { reach, reach_squared: largest_square(reach), found, grid: Grid::default() }
     }
 
-    /// Places of a robot's neighbours.
+    /// Range of a robot's neighbours in the lists.
     pub fn places(&self, robot: usize) -> Range<usize> {
         self.found.first[robot]..self.found.first[robot + 1]
     }
 
-    /// The neighbour at a place.
+    /// The neighbour at an index.
     pub fn get(&self, place: usize) -> Neighbour {
         Neighbour {
             robot: self.found.robots[place] as usize,
@@ -93,22 +93,22 @@ impl Neighbours {
         self.places(robot).map(|place| self.get(place))
     }
 
-    /// Who the neighbours at some places are.
+    /// Numbers of the neighbours in a range.
     pub fn robots(&self, places: Range<usize>) -> &[u32] {
         &self.found.robots[places]
     }
 
-    /// Directions of the neighbours at some places.
+    /// Directions of the neighbours in a range.
     pub fn bearings(&self, places: Range<usize>) -> &[f64] {
         &self.found.bearing[places]
     }
 
-    /// Distances of the neighbours at some places.
+    /// Distances of the neighbours in a range.
     pub fn distances(&self, places: Range<usize>) -> &[f64] {
         &self.found.rho[places]
     }
 
-    /// Finds everybody's neighbours.
+    /// Finds the neighbours of all robots.
     pub fn update(&mut self, torus: &Torus, positions: &[Vec2]) {
         if self.reach == 0.0 {
             return; // no robot senses another one
@@ -150,12 +150,12 @@ fn largest_square(reach: f64) -> f64 {
     square
 }
 
-/// The search for everybody's neighbours.
+/// The search for the neighbours of all robots.
 struct Search<'a> {
     torus: &'a Torus,
     reach_squared: f64,
     positions: &'a [Vec2],
-    /// Those whose neighbours are searched for.
+    /// The robots whose neighbours to find.
     robots: Range<usize>,
     grid: &'a Grid,
     has_grid: bool,
@@ -186,14 +186,14 @@ impl WithSimd for Search<'_> {
 }
 
 impl Found {
-    /// Makes room for so many, of whom `n_new` have yet to be located.
+    /// Makes room for `n` neighbours, of which `n_new` are not located yet.
     fn make_room(&mut self, n: usize, n_new: usize) {
         self.robots.resize(n.max(self.robots.len()), 0);
         self.away_x.resize(n_new.max(self.away_x.len()), 0.0);
         self.away_y.resize(n_new.max(self.away_y.len()), 0.0);
     }
 
-    /// Computes how far the neighbours of some robots are, and where.
+    /// Computes distances and directions of the neighbours of some robots.
     fn locate(&mut self, robots: Range<usize>) {
         let places = self.first[robots.start]..self.first[robots.end];
         self.rho.resize(self.robots.len(), 0.0);
@@ -203,25 +203,25 @@ impl Found {
     }
 }
 
-/// What is near a robot.
+/// The neighbours of one robot during the search.
 struct Near<'a> {
     torus: &'a Torus,
     reach_squared: f64,
     robot: u32,
     from: Vec2,
-    /// The place of the first neighbour that is not yet located.
+    /// Index of the first neighbour that is not located yet.
     first: usize,
 }
 
-/// Robots that are looked at together: so many numbers fit into the longest vector.
+/// Number of robots to compare at once: the longest vector holds this many numbers.
 const N_AT_ONCE: usize = 8;
 
 impl Near<'_> {
-    /// Writes those of a range of robots that are near after the `n_found` that are not yet
-    /// located; returns how many these are now.
+    /// Writes the near robots of a range after the `n_found` neighbours that are not located yet;
+    /// returns the new number of these.
     ///
-    /// Which ones are is not to be foreseen, so there is no branch: each is noted, and the next
-    /// one over it unless it is near.
+    /// The outcome is unpredictable, so the code has no branch: it writes every robot, and the
+    /// next one overwrites a robot that is not near.
     #[inline(always)]
     fn search(
         &self,
@@ -262,7 +262,7 @@ impl Near<'_> {
     }
 }
 
-/// Robots and where they are.
+/// Robots and their positions.
 #[derive(Debug, Clone, Default)]
 struct Placed {
     robots: Vec<u32>,
@@ -271,7 +271,7 @@ struct Placed {
 }
 
 impl Placed {
-    /// As many as `n`, and room to look at the last ones in whole vectors.
+    /// Resizes to `n` robots, with room to read the last ones in whole vectors.
     fn resize(&mut self, n: usize) {
         self.robots.resize(n, 0);
         self.x.resize(n + N_AT_ONCE, 0.0);
@@ -299,8 +299,8 @@ struct Grid {
 }
 
 impl Grid {
-    /// Sorts robots into cells no shorter than `reach`. False if there are so few cells
-    /// that left and right neighbours are the same.
+    /// Sorts robots into cells no shorter than `reach`. Returns false if there are so few cells
+    /// that left and right neighbours coincide.
     fn sort(&mut self, torus: &Torus, reach: f64, positions: &[Vec2]) -> bool {
         let n = |extent| n_cells(extent, reach, positions.len());
         (self.n_columns, self.n_rows) = (n(torus.width), n(torus.height));
@@ -323,7 +323,7 @@ impl Grid {
             *first = n;
         }
         self.robots.resize(positions.len());
-        // Backwards, so that every cell's robots come in their order.
+        // Backwards, so that the robots of every cell stay in order.
         for (robot, (&position, &cell)) in positions.iter().zip(&cells).enumerate().rev() {
             let place = &mut self.first[cell as usize];
             *place -= 1;
@@ -341,11 +341,11 @@ impl Grid {
         }
     }
 
-    /// Where the robots in the cells around a position are.
+    /// Ranges of the robots in the cells around a position.
     #[inline(always)]
     fn around(&self, position: Vec2) -> [Range<usize>; 6] {
         let (column, row) = self.column_and_row(position);
-        // Neighbouring cells of a row are neighbours in memory, but for the seam.
+        // Neighbouring cells of a row are adjacent in memory, except at the seam.
         let last = self.n_columns - 1;
         let (middle, beyond) = match column {
             0 => (0..2, last..last + 1),

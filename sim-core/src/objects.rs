@@ -1,23 +1,23 @@
-//! Objects of the world as compiled: what the instances of one have in common.
+//! Compiled objects of the world: the data that the instances of an object share.
 
 use std::ops::Range;
 
 use crate::initializers::Positions;
 use crate::problems::Problems;
 
-/// Where the instances of an object come from.
+/// The object to which instances belong, and their start.
 #[derive(Debug, Clone)]
 pub(crate) struct Site {
     /// Name of the object.
     pub name: String,
     /// Index of the object.
     pub object: usize,
-    /// Where its instances start.
+    /// The start positions of its instances.
     pub positions: Positions,
 }
 
 impl Site {
-    /// The site of object number `object`; none if nothing can start there.
+    /// The site of object number `object`; `None` if its initialiser has a mistake.
     pub fn new(
         object: usize,
         name: &str,
@@ -37,7 +37,7 @@ impl Site {
 /// The lights, or the ground areas, of one object.
 #[derive(Debug, Clone)]
 pub(crate) struct StaticObjects {
-    /// Where they come from.
+    /// Their object.
     pub site: Site,
     /// Their numbers among all lights, or all ground areas.
     pub members: Range<usize>,
@@ -49,7 +49,7 @@ pub(crate) struct StaticObjects {
     pub by_script: bool,
 }
 
-/// Which lights and ground areas are on: sensors do not see the others.
+/// Whether lights and ground areas are on: sensors do not see those that are off.
 #[derive(Debug, Clone)]
 pub(crate) struct Switches {
     /// Per light.

@@ -1,6 +1,6 @@
-//! What is computed of a trial.
+//! The kind of result of a trial.
 
-/// What somebody wants to know of each trial.
+/// The kind of result to compute for each trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Output {
     /// One number per trial: its fitness. See

@@ -7,9 +7,9 @@ use pulp::{Simd, WithSimd};
 use crate::torus::Vec2;
 use determinism::Isa;
 
-/// Computes the polar coordinates of points (x, y), cm: `rho`, their distance from the origin,
-/// cm, and `bearing`, their direction seen from it, in \[0, 2 pi), 0 for the origin itself. All
-/// slices have the same length.
+/// Computes the polar coordinates of points (x, y), cm: `rho`, the distance from the origin, cm,
+/// and `bearing`, the direction from the origin, in \[0, 2 pi), which is 0 at the origin itself.
+/// All slices have the same length.
 pub(crate) fn complete(x: &[f64], y: &[f64], rho: &mut [f64], bearing: &mut [f64]) {
     Isa::best().run(Complete { x, y, rho, bearing });
 }
@@ -24,8 +24,8 @@ struct Complete<'a> {
 impl WithSimd for Complete<'_> {
     type Output = ();
 
-    /// Without a branch, the compiler computes several points at once; in blocks, lest it
-    /// computes the last ones singly.
+    /// Without branches, the compiler computes several points at once. Blocks keep it from
+    /// computing the last points one by one.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         const N: usize = 16;
@@ -46,8 +46,8 @@ impl WithSimd for Complete<'_> {
     }
 }
 
-/// Signed angle of a vector in \[0, 2 pi), to 4e-16 of a turn; 0 for the zero vector, whatever
-/// the signs of its zeros.
+/// The angle of a vector in \[0, 2 pi), to 4e-16 of a turn; 0 for the zero vector, with zeros of
+/// any sign.
 #[inline(always)]
 pub(crate) fn angle(x: f64, y: f64) -> f64 {
     let (width, height) = (x.abs(), y.abs());
@@ -70,7 +70,7 @@ pub(crate) fn angle(x: f64, y: f64) -> f64 {
     let quadrant = if is_steep { FRAC_PI_2 - octant } else { octant };
     let half = if x < 0.0 { PI - quadrant } else { quadrant };
     let whole = if y < 0.0 { TAU - half } else { half };
-    // A tiny angle below 0 rounds up to the turn itself.
+    // A tiny negative angle would round up to a full turn.
     if whole < TAU { whole } else { 0.0 }
 }
 

@@ -1,4 +1,4 @@
-//! Collects what is wrong with an experiment while it is compiled.
+//! Collects the problems of an experiment during its compilation.
 
 use experiment_file::{ConfigError, Problem};
 

@@ -1,5 +1,4 @@
-//! What there is to see in an episode: every robot in every step, and how well
-//! the task is done.
+//! Records of an episode: every robot in every step, and the fitness and measures of the task.
 
 use std::borrow::Cow;
 use std::ops::Not;
@@ -18,12 +17,13 @@ pub type MeasureName = Cow<'static, str>;
 /// light without lights, of robots with the LED on when there are none) is absent.
 pub type Measures = IndexMap<MeasureName, f64>;
 
-/// The result of an episode that was watched.
+/// The result of a watched episode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeSummary {
-    /// The same as [`Simulation::evaluate`](crate::Simulation::evaluate) gives.
+    /// The fitness of the episode, as [`Simulation::evaluate`](crate::Simulation::evaluate)
+    /// returns it.
     pub fitness: f64,
-    /// Means over the steps.
+    /// Means of the measures over the steps that have them.
     #[serde(rename = "metrics")]
     pub measures: Measures,
 }
@@ -33,16 +33,16 @@ pub struct EpisodeSummary {
 pub struct StepRecord {
     /// From 0.
     pub step: u32,
-    /// Fitness of the step; none if it does not count.
+    /// Fitness of the step; `None` if it does not count.
     pub fitness: Option<f64>,
     /// Measures of the step.
     #[serde(rename = "metrics")]
     pub measures: Measures,
     /// All robots, in the order of the objects of the world.
     pub robots: Vec<RobotRecord>,
-    /// Positions of all lights during the step.
+    /// Positions of all lights during the step, cm.
     pub lights: Vec<Vec2>,
-    /// Positions of all ground areas during the step.
+    /// Positions of all ground areas during the step, cm.
     pub areas: Vec<Vec2>,
 }
 
@@ -51,18 +51,19 @@ pub struct StepRecord {
 pub struct RobotRecord {
     /// Position at the end of the step, cm.
     pub position: Vec2,
-    /// Heading at the end of the step, in \[0, 2 pi).
+    /// Heading at the end of the step, radians in \[0, 2 pi).
     pub heading: f64,
-    /// What its controller got, input by input.
+    /// The stimuli of its controller, one value per input.
     pub stimuli: Vec<f64>,
-    /// Activity of every neuron of its network after the step, in the order of
+    /// Activity of every neuron after the step, in the order of
     /// [`Simulation::network_json`](crate::Simulation::network_json); empty without a network.
+    /// For spiking neurons, the share of substeps with a spike.
     pub activity: Vec<f64>,
-    /// Voltage of every spiking neuron after the step, mV, in the same order; empty
-    /// without spiking neurons. Their activity is the share of substeps with a spike.
+    /// Voltage of every spiking neuron after the step, mV, in the same order; empty without
+    /// spiking neurons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub voltages: Vec<f64>,
-    /// The frame that it took from the air.
+    /// The frame that it took from the air; `None` without one.
     pub received: Option<ReceivedFrame>,
     /// The message of that frame; zeros without one.
     pub received_message: Vec<f64>,
@@ -70,9 +71,10 @@ pub struct RobotRecord {
     pub wheels: [f64; 2],
     /// Colour of its LED, 0 off.
     pub led: u32,
-    /// Whether it sent or relayed.
+    /// Whether it sends or relays.
     pub mode: Mode,
-    /// Its own message, as quantised; on the air if it sent.
+    /// Its own message after quantisation, components in \[0, 1\]; on the air if `mode` is
+    /// [`Mode::Send`].
     pub message: Vec<f64>,
     /// Whether a script has put it out of order.
     #[serde(skip_serializing_if = "Not::not")]
@@ -80,18 +82,18 @@ pub struct RobotRecord {
     /// Whether it carries something, as a script says.
     #[serde(skip_serializing_if = "Not::not")]
     pub carries: bool,
-    /// Whether its LED should be on, where the task says who it should be.
+    /// Whether its LED should be on; `None` if the task does not define it.
     pub target: Option<bool>,
 }
 
 /// A frame that a robot took from the air.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ReceivedFrame {
-    /// The robot from which it came.
+    /// The robot that emitted it.
     pub emitter: usize,
     /// The robot whose message it carries.
     pub originator: usize,
-    /// Emissions until then, from 1.
+    /// Number of emissions so far, from 1.
     pub hops: u32,
     /// The sector that received it.
     pub sector: usize,

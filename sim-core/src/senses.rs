@@ -1,4 +1,4 @@
-//! What robots perceive: the readings that stimuli are made of.
+//! The readings of robots, from which stimuli are made.
 
 use std::ops::Range;
 
@@ -11,12 +11,12 @@ use crate::world::RobotGroup;
 use determinism::random::{Stream, standard_normal_quantiles};
 use experiment_file::SensorQuery;
 
-/// Readings of the robots of one group in one trial, beside those of the radio.
+/// Readings of the robots of one group in one trial, except those of the radio.
 #[derive(Debug, Clone)]
 pub(crate) struct Senses {
     /// As [`RobotGroup::sensors`].
     sensors: Vec<SensorState>,
-    /// Where noise comes from.
+    /// The sources of noise.
     noise: Vec<NoiseSource>,
 }
 
@@ -26,28 +26,28 @@ struct NoiseSource {
     key: NoiseStream,
     /// Per robot of the group.
     streams: Vec<Stream>,
-    /// How many sensors draw from them.
+    /// Number of sensors that draw from them.
     n_sensors: usize,
-    /// Scratch: what has been drawn.
+    /// Scratch: the drawn values.
     normals: Vec<f64>,
 }
 
-/// What a mounted sensor has in one trial.
+/// The state of a mounted sensor in one trial.
 #[derive(Debug, Clone)]
 struct SensorState {
     query: SensorQuery,
-    /// Values of a robot's reading.
+    /// Number of values of a robot's reading.
     reading_len: usize,
     /// `[robot][value]`
     readings: Vec<f64>,
-    /// Per robot, whether its controller gets the reading: it is not inhibited.
+    /// Whether each robot's controller gets the reading, which may be inhibited.
     is_wanted: Vec<bool>,
-    /// Place of its noise in [`Senses::noise`]; none without noise.
+    /// Index of its noise in [`Senses::noise`]; `None` without noise.
     noise: Option<usize>,
 }
 
 impl Senses {
-    /// Nothing perceived yet. `stream` gives a stream of noise by its number.
+    /// Senses before the first step. `stream` returns a stream of noise by its number.
     pub fn new(
         group: &RobotGroup,
         perturbations: &Perturbations,
@@ -133,8 +133,8 @@ impl Senses {
         }
     }
 
-    /// A reading of a robot of the group, its `index` among them, without inhibition; zeros
-    /// before the first step.
+    /// A reading of the group's robot number `index`, without inhibition; zeros before the first
+    /// step.
     pub fn reading(
         &self,
         (query, len): (SensorQuery, usize),
@@ -169,8 +169,8 @@ impl Senses {
         }
     }
 
-    /// Senses with every robot of the group, sensor by sensor in the order in which
-    /// they are mounted.
+    /// Updates the readings of every robot of the group, sensor by sensor in the order of
+    /// mounting.
     pub fn update(&mut self, group: &RobotGroup, swarm: &Swarm, surroundings: &Surroundings<'_>) {
         for (mounted, state) in group.sensors.iter().zip(&mut self.sensors) {
             let SensorState { reading_len, readings, is_wanted, .. } = state;
@@ -184,8 +184,7 @@ impl Senses {
         }
     }
 
-    /// Takes what a script says of a robot of the group, its `index` among them, as the reading of
-    /// its `script_sensor`.
+    /// Sets the `script_sensor` reading of the group's robot number `index` to a script's result.
     pub fn take(&mut self, group: &RobotGroup, index: usize, reading: &[f64]) {
         for (mounted, state) in group.sensors.iter().zip(&mut self.sensors) {
             if state.query == SensorQuery::Script {
@@ -205,21 +204,21 @@ fn clip(sensor: &dyn Sensor, values: &mut [f64]) {
     }
 }
 
-/// Writes as many values as there are robots in a row.
+/// Writes one value per robot into a row.
 fn fill(row: &mut [f32], values: impl Iterator<Item = f64>) {
     for (lane, value) in row.iter_mut().zip(values) {
         *lane = value as f32;
     }
 }
 
-/// A component of a direction; zero if there is none.
+/// A component of a direction; zero without a direction.
 fn component(direction: Option<Vec2>, index: usize) -> f64 {
     direction.map_or(0.0, |direction| if index == 0 { direction.x } else { direction.y })
 }
 
 impl NoiseSource {
-    /// Adds Gaussian noise to each value of the readings `[robot][value]` that are wanted, one
-    /// draw each.
+    /// Adds Gaussian noise to each value of the wanted readings, `[robot][value]`, with one draw
+    /// each.
     fn add(
         &mut self,
         deviation: f64,
@@ -235,8 +234,8 @@ impl NoiseSource {
                 stream.fill_probability(&mut normals[n_drawn..n_drawn + reading_len]);
                 n_drawn += reading_len;
             } else if *n_sensors > 1 {
-                // The reading is not used, but the next noise in the stream is another
-                // sensor's.
+                // The reading is unused, but the next draw of the stream belongs to another
+                // sensor.
                 stream.skip(reading_len);
             }
         }

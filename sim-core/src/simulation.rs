@@ -1,4 +1,4 @@
-//! An experiment, compiled: everything that is the same for all its episodes.
+//! The compiled experiment, which all episodes share.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use determinism::{Isa, random::TrialSet};
 use experiment_file::{ConfigError, ExperimentConfig, FitnessParams, limits};
 use task_script::ScriptError;
 
-/// Trials whose start is tried out when an experiment is compiled.
+/// Number of trials whose start positions are tried at compilation.
 const N_TRIED_TRIALS: u32 = 8;
 
 /// A compiled experiment: (genotype, trial set, trials) -> fitness.
@@ -28,7 +28,7 @@ pub struct Simulation {
     pub(crate) seed: u64,
     pub(crate) n_steps: u32,
     n_trials: u32,
-    /// None: the script computes it.
+    /// `None`: the script computes the fitness.
     pub(crate) fitness: Option<&'static Definition>,
     pub(crate) fitness_params: FitnessParams,
     pub(crate) script: Option<Arc<ScriptTask>>,
@@ -41,12 +41,12 @@ pub struct Simulation {
 /// Why a genotype could not be evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EvaluateError {
-    /// The genotype has another length: a bug of the caller.
+    /// The genotype has the wrong length: a bug of the caller.
     #[error("the genotype has {actual} genes, the experiment's have {expected}")]
     GenotypeLength {
-        /// Genes of the experiment's genotypes.
+        /// Number of genes of the experiment's genotypes.
         expected: usize,
-        /// Genes of this one.
+        /// Number of genes of this one.
         actual: usize,
     },
     /// A gene outside \[0, 1\] or not finite: a bug of the caller.
@@ -57,14 +57,14 @@ pub enum EvaluateError {
         /// Its value.
         value: f64,
     },
-    /// No trials, or some beyond the limit: a bug of the caller.
+    /// The range of trials is empty or beyond the limit: a bug of the caller.
     #[error("trials {}..{} are not within 0..{}", trials.start, trials.end, limits::TRIALS)]
     Trials {
         /// The requested trials.
         trials: Range<u32>,
     },
-    /// An initialiser found no place: the experiment asks for what its world
-    /// cannot hold. Every genotype meets it in this trial.
+    /// An initialiser found no place, because the world is too small for its objects. Every
+    /// genotype fails in this trial.
     #[error(
         "world.objects.{object}.initializers.positions: no place for number {index} \
          in {trial_set}, trial {trial}"
@@ -74,19 +74,19 @@ pub enum EvaluateError {
         object: String,
         /// Index of the instance without a place.
         index: usize,
-        /// The set that the trial is of.
+        /// The trial set.
         trial_set: TrialSet,
         /// The trial.
         trial: u32,
     },
-    /// The script of the experiment's task went wrong.
+    /// The script of the experiment's task failed.
     #[error("{error} (in step {step} of {trial_set}, trial {trial})")]
     Script {
-        /// Where and why.
+        /// The place and the reason.
         error: ScriptError,
         /// The environment step, from 0.
         step: u32,
-        /// The set that the trial is of.
+        /// The trial set.
         trial_set: TrialSet,
         /// The trial.
         trial: u32,
@@ -94,9 +94,12 @@ pub enum EvaluateError {
 }
 
 impl Simulation {
-    /// Compiles a configuration that the reader of experiment files accepts. What
-    /// only compiling can find (an initialiser that cannot be met, say) is
-    /// reported in the same way.
+    /// Compiles a configuration that the reader of experiment files accepts.
+    ///
+    /// # Errors
+    ///
+    /// All problems that only compilation finds, such as an initialiser that finds no place for
+    /// its objects.
     pub fn compile(config: &ExperimentConfig) -> Result<Self, ConfigError> {
         let mut problems = Problems::default();
         let algorithm = &config.algorithm;
@@ -146,19 +149,19 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// The same experiment, simulated with other vector instructions than the
-    /// processor's best. No bit of any result changes.
+    /// The same experiment with other vector instructions than the processor's best. No bit of
+    /// any result changes.
     #[must_use]
     pub fn with_isa(self, isa: Isa) -> Self {
         Self { isa, ..self }
     }
 
-    /// Length d of a genotype.
+    /// Number d of genes of a genotype.
     pub fn genotype_len(&self) -> usize {
         self.codec.genotype_len()
     }
 
-    /// Genes of each population, in the order of `algorithm.populations`.
+    /// Range of genes of each population, in the order of `algorithm.populations`.
     pub fn population_segments(&self) -> &[Range<usize>] {
         self.codec.segments()
     }
@@ -169,12 +172,16 @@ impl Simulation {
         self.codec.uncovered()
     }
 
-    /// Simulates one episode per trial and returns their fitness, in order.
+    /// Simulates one episode per trial, and returns the fitness of each, in order.
     ///
-    /// `genotype`: d genes in \[0, 1\]; `trial_set`: which worlds and noise, the
-    /// number of a generation for those of that generation; `trials`: a non-empty
-    /// part of 0..[`limits::TRIALS`]. The fitness of a trial does not depend on which
-    /// other trials are asked for.
+    /// `genotype`: d genes in \[0, 1\]. `trial_set`: determines worlds and noise; a number stands
+    /// for that generation. `trials`: a non-empty part of 0..[`limits::TRIALS`]. The fitness of a
+    /// trial does not depend on the other trials of the call.
+    ///
+    /// # Errors
+    ///
+    /// If an argument is out of range, if an object finds no place in a trial, or if the script
+    /// fails.
     pub fn evaluate(
         &self,
         genotype: &[f64],
@@ -185,9 +192,13 @@ impl Simulation {
         Ok(fitness.expect("nothing stopped it"))
     }
 
-    /// As [`evaluate`](Self::evaluate), but asks before every environment step, and every few
-    /// milliseconds of a script, whether to go on; none if it was stopped. So a clock or another
-    /// thread may end it, and decides no bit of a result.
+    /// As [`evaluate`](Self::evaluate), but calls `keep_going` before every environment step, and
+    /// every few milliseconds of a script; `None` if that returned false. So a clock or another
+    /// thread can end it, without deciding a bit of a result.
+    ///
+    /// # Errors
+    ///
+    /// As [`evaluate`](Self::evaluate).
     pub fn evaluate_while(
         &self,
         genotype: &[f64],
@@ -208,20 +219,24 @@ impl Simulation {
         &self.measure_names
     }
 
-    /// Environment steps of an episode.
+    /// Number of environment steps of an episode.
     pub fn n_steps(&self) -> u32 {
         self.n_steps
     }
 
-    /// Numbers that [`measure_while`](Self::measure_while) gives per trial.
+    /// Number of values per trial in [`measure_while`](Self::measure_while).
     pub fn values_per_trial(&self) -> usize {
         1 + self.n_steps as usize * self.measure_names().len()
     }
 
-    /// As [`evaluate_while`](Self::evaluate_while), and measures every step. For
-    /// each trial there are [`values_per_trial`](Self::values_per_trial) numbers: its
-    /// fitness, the same bits as always, and then step by step the value of every
-    /// measure in [`measure_names`](Self::measure_names), NaN where there is none.
+    /// As [`evaluate_while`](Self::evaluate_while), and measures every step. Returns
+    /// [`values_per_trial`](Self::values_per_trial) numbers for each trial, one trial after the
+    /// other: its fitness, with the same bits, and then step by step the value of every measure
+    /// in [`measure_names`](Self::measure_names); NaN where a measure has no value.
+    ///
+    /// # Errors
+    ///
+    /// As [`evaluate`](Self::evaluate).
     pub fn measure_while(
         &self,
         genotype: &[f64],
@@ -237,9 +252,13 @@ impl Simulation {
         Ok(done.then_some(recorder.values))
     }
 
-    /// Simulates the episode of one trial and shows each of its steps to
-    /// `observe`, in a record that the next step overwrites. Watching changes nothing: the fitness is
-    /// [`evaluate`](Self::evaluate)'s, bit for bit.
+    /// Simulates the episode of one trial, and shows each step to `observe`, in a record that the
+    /// next step overwrites. Watching changes nothing: the fitness has the same bits as in
+    /// [`evaluate`](Self::evaluate).
+    ///
+    /// # Errors
+    ///
+    /// As [`evaluate`](Self::evaluate).
     pub fn simulate(
         &self,
         genotype: &[f64],
@@ -251,8 +270,12 @@ impl Simulation {
         Ok(summary.expect("nothing stopped it"))
     }
 
-    /// As [`simulate`](Self::simulate), but asks as [`evaluate_while`](Self::evaluate_while) does
-    /// whether to go on; none if it was stopped.
+    /// As [`simulate`](Self::simulate), but stops as [`evaluate_while`](Self::evaluate_while)
+    /// does; `None` if it was stopped.
+    ///
+    /// # Errors
+    ///
+    /// As [`evaluate`](Self::evaluate).
     pub fn simulate_while(
         &self,
         genotype: &[f64],
@@ -270,8 +293,12 @@ impl Simulation {
         Ok(done.then(|| recorder.summary()))
     }
 
-    /// The network that a genotype encodes, as JSON: stimuli, neurons with
-    /// `tau`, `bias`, `gain` and activation, synapses with weights.
+    /// The network that a genotype encodes, as JSON: stimuli, neurons with `tau`, `bias`, `gain`
+    /// and activation, synapses with weights.
+    ///
+    /// # Errors
+    ///
+    /// If the genotype has the wrong length, or a gene outside \[0, 1\].
     pub fn network_json(&self, genotype: &[f64]) -> Result<serde_json::Value, EvaluateError> {
         Ok(self.network.to_json(&self.phenotype(genotype)?))
     }
@@ -289,7 +316,11 @@ impl Simulation {
         Ok(())
     }
 
-    /// Makes sure that a genotype has d genes in \[0, 1\].
+    /// Checks that a genotype has d genes in \[0, 1\].
+    ///
+    /// # Errors
+    ///
+    /// If it has not.
     pub fn check_genotype(&self, genotype: &[f64]) -> Result<(), EvaluateError> {
         let (expected, actual) = (self.genotype_len(), genotype.len());
         if actual != expected {
@@ -302,7 +333,7 @@ impl Simulation {
     }
 }
 
-/// Those of the function, then those of the script that have other names.
+/// The measures of the function, and then those of the script with other names.
 fn measure_names(
     fitness: Option<&'static Definition>,
     script: Option<&ScriptTask>,
@@ -343,7 +374,7 @@ mod tests {
             let measured = simulation.measure_while(&genotype, trial_set, trials, &|| true);
             measured.unwrap().unwrap()
         };
-        // More than are simulated at once.
+        // More than fit side by side.
         let together = measure(0..40);
         let fitness = simulation.evaluate(&genotype, trial_set, 0..40).unwrap();
         assert_eq!(together.len(), 40 * n_values);

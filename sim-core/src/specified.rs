@@ -1,8 +1,8 @@
-//! An experiment as one process hands it to another: from the text of its
-//! specification to numbers, or to a failure in words.
+//! Simulates an experiment from the text of its specification, as processes send it to each
+//! other: to numbers, or to a failure message.
 //!
-//! The simulation is deterministic, and so are its failures: every process that
-//! computes an item by way of this module fails it with the same words, to the byte.
+//! The simulation is deterministic, and so are its failures: every process that computes an item
+//! with this module returns the same message, to the byte.
 
 use std::{
     any::Any,
@@ -15,7 +15,7 @@ use experiment_file::{ConfigError, ExperimentConfig};
 
 use crate::{Output, Simulation};
 
-/// A simulation that is compiled from text and says in words why it fails.
+/// A simulation that is compiled from text, and whose failures are messages.
 #[derive(Debug)]
 pub struct SpecifiedSimulation {
     simulation: Simulation,
@@ -23,8 +23,11 @@ pub struct SpecifiedSimulation {
 }
 
 impl SpecifiedSimulation {
-    /// Compiles a specification, which is an experiment in its canonical form. The
-    /// error is the failure of every item of that experiment.
+    /// Compiles a specification, which is an experiment in its canonical form.
+    ///
+    /// # Errors
+    ///
+    /// The failure message of every item of that experiment, if the specification is invalid.
     pub fn compile(config_json: &str, isa: Isa) -> Result<Self, String> {
         Self::try_compile(config_json, isa)
             .map_err(|error| format!("the experiment's specification is not valid: {error}"))
@@ -43,8 +46,12 @@ impl SpecifiedSimulation {
         self.robot_steps
     }
 
-    /// Computes the trials of one genotype: [`Simulation::evaluate_while`] or
-    /// [`Simulation::measure_while`], as `output` says. None if `keep_going` stopped it.
+    /// Computes the trials of one genotype with [`Simulation::evaluate_while`] or
+    /// [`Simulation::measure_while`], as `output` says. `None` if `keep_going` stopped it.
+    ///
+    /// # Errors
+    ///
+    /// The failure message of the item.
     pub fn compute(
         &self,
         genotype: &[f64],
@@ -62,7 +69,11 @@ impl SpecifiedSimulation {
     }
 }
 
-/// Runs a computation; a panic is its failure, not the process's.
+/// Runs a computation; a panic fails the computation, not the process.
+///
+/// # Errors
+///
+/// The error of the computation, or the message of its panic.
 pub fn panic_to_failure<T>(computation: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     panic::catch_unwind(AssertUnwindSafe(computation))
         .unwrap_or_else(|payload| Err(format!("panicked: {}", panic_message(&*payload))))

@@ -1,4 +1,4 @@
-//! Whether the world can hold its objects: by trying, as nobody can tell from sizes.
+//! Checks by trying whether the world can hold its objects, because sizes do not tell.
 
 use std::time::Duration;
 
@@ -12,30 +12,29 @@ use crate::script;
 use crate::simulation::{EvaluateError, Simulation};
 use crate::trial;
 
-/// Starts that are tried at the most: the first of those that fail one time in a hundred
-/// is found almost always.
+/// Most starts to try: enough to find a failure that happens once in a hundred trials.
 const N_STARTS_MAX: u64 = 512;
-/// Steps of the episode in which a script is tried.
+/// Number of steps of the episode that tries a script.
 const N_TRIED_STEPS: u32 = 50;
-/// Pairs of robots whose distances a check may take, about.
+/// Approximate number of distances between robots that a check may compute.
 const N_PAIRS_MAX: u64 = 50_000_000;
 
-/// After so long, whoever checks an experiment ends trying it. What was not tried is a warning, so
-/// no clock decides whether an experiment is accepted.
+/// Time after which callers should stop trying an experiment. An incomplete trial is only a
+/// warning, so no clock decides whether an experiment is accepted.
 pub const TRYING_TIME_MAX: Duration = Duration::from_secs(2);
 
-/// How far an experiment was tried.
+/// The extent of a trial of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[must_use]
 pub enum Tried {
-    /// As far as it ever is.
+    /// Completely.
     All,
-    /// Until it was stopped; nothing was wrong so far.
+    /// Until the caller stopped it, without a problem so far.
     InPart,
 }
 
 impl Tried {
-    /// What people should know of it.
+    /// The warning for people, if the trial was incomplete.
     pub fn warning(self) -> Option<&'static str> {
         match self {
             Self::All => None,
@@ -48,13 +47,17 @@ impl Tried {
 }
 
 impl Simulation {
-    /// Tries where objects start in trials of a run: those of the judgement at its end,
-    /// then those of its first generations, as far as that is quick. One where an
-    /// object finds no place would end the run.
+    /// Tries the start positions of a run's trials: those of the judgement at its end, then those
+    /// of its first generations, as long as that is quick. A trial in which an object finds no
+    /// place would end the run.
     ///
-    /// A script is executed for an episode's first steps, so that what it gets wrong is
-    /// known before anything is computed. When `goes_on` says no, as a clock may, trying ends:
-    /// the answer is then what was tried.
+    /// It also executes a script for the first steps of an episode, to find its mistakes before
+    /// the run. `goes_on` returns false to stop, for example by a clock; the result is then
+    /// [`Tried::InPart`].
+    ///
+    /// # Errors
+    ///
+    /// If an object finds no place, or if the script fails.
     pub fn check_starts(
         &self,
         algorithm: &AlgorithmConfig,
@@ -96,7 +99,7 @@ impl Simulation {
         Ok(Tried::All)
     }
 
-    /// Executes the script in a short episode, measures included; false if it was stopped.
+    /// Executes the script in a short episode, including its measures; false if it was stopped.
     fn try_script(&self, goes_on: &dyn Fn() -> bool) -> Result<bool, ConfigError> {
         if self.script.is_none() {
             return Ok(true);
@@ -114,7 +117,7 @@ impl Simulation {
     }
 }
 
-/// Distances that are computed to place an object's instances; 0 if they always find a
+/// Number of distances to compute for placing an object's instances; 0 if they always find a
 /// place.
 fn n_pairs_of_a_draw(site: &Site) -> u64 {
     match site.positions {

@@ -1,4 +1,4 @@
-//! Episodes step by step, with robots whose actions somebody else decides.
+//! Steps episodes whose robots get their actions from the caller.
 
 use std::ops::Range;
 
@@ -12,8 +12,9 @@ use crate::trial::{Trial, encoding_streams};
 use determinism::random::{Stream, TrialSet};
 use experiment_file::RobotController;
 
-/// Trials of an experiment side by side, whose robots with a network, the *agents*, do what
-/// they are told: stimuli out, actions in. Robots with another controller decide for themselves.
+/// Trials of an experiment side by side. The caller decides for the *agents*, the robots with a
+/// network: it reads their stimuli and sets their actions. Robots with another controller decide
+/// for themselves.
 ///
 /// With the actions of [`decide`](Self::decide), fitness and everything else are those of
 /// [`Simulation::simulate`], bit for bit.
@@ -22,7 +23,7 @@ pub struct Stepper<'a> {
     trials: Vec<Trial<'a>>,
     groups: Vec<Group<'a>>,
     n_agents: usize,
-    /// Who emits nothing in this step, `[trial][agent]`.
+    /// Whether each agent emits nothing in this step, `[trial][agent]`.
     silent: Vec<bool>,
     step: u32,
 }
@@ -38,21 +39,21 @@ struct Group<'a> {
 }
 
 enum Decider<'a> {
-    /// Whoever calls, for as many agents before this group in each trial.
+    /// The caller decides; `first_agent`: number of agents before this group in each trial.
     Caller { first_agent: usize },
-    /// The robots themselves.
+    /// The robots decide for themselves.
     Own(Box<dyn Controller + 'a>),
 }
 
-/// What the agents of all trials do in one step: arrays `[trial][agent]`, and
-/// `[trial][agent][component]` of messages.
+/// The actions of the agents of all trials in one step: arrays of shape `[trial][agent]`,
+/// flattened, and `[trial][agent][component]` for messages.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Actions {
     /// Right and left wheel, in \[-1, 1\].
     pub wheels: Vec<[f64; 2]>,
     /// Colour of the LED, 0 off.
     pub leds: Vec<u32>,
-    /// Whether it sends its own message; else it relays.
+    /// Whether it sends its own message; otherwise it relays.
     pub sends: Vec<bool>,
     /// Message, before quantisation, in \[0, 1\].
     pub messages: Vec<f64>,
@@ -60,44 +61,44 @@ pub struct Actions {
 
 /// The network of a genotype, in all trials of a [`Stepper`], with its state.
 pub struct Policy<'a> {
-    /// Per group, none where robots decide for themselves.
+    /// The controller of each group; `None` where robots decide for themselves.
     controllers: Vec<Option<NeuralController<'a>>>,
 }
 
-/// Why a step cannot be taken.
+/// Why a step failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StepError {
-    /// An array of actions has another length.
+    /// An array has the wrong length.
     #[error("{expected} {what} are needed, there are {actual}")]
     Length {
-        /// What the array has.
+        /// The elements of the array.
         what: &'static str,
-        /// How many are needed.
+        /// The required number.
         expected: usize,
-        /// How many there are.
+        /// The given number.
         actual: usize,
     },
     /// An action is outside its range or not finite.
     #[error("{what} number {index} is {value}, not within {range}")]
     Range {
-        /// What it is.
+        /// The kind of value.
         what: &'static str,
-        /// Its place in the array.
+        /// Its index in the array.
         index: usize,
         /// Its value.
         value: f64,
-        /// What would be right.
+        /// The allowed range.
         range: &'static str,
     },
     /// The episode is over.
     #[error("the episode has ended after {0} steps; begin another one")]
     Over(u32),
-    /// The world cannot hold its robots any more.
+    /// The simulation failed, for example because robots find no place.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
 }
 
-/// Gives agents the actions of the caller.
+/// The controller that gives agents the actions of the caller.
 struct Commanded<'a> {
     actions: &'a Actions,
     /// The agent of the first lane.
@@ -120,7 +121,12 @@ impl Controller for Commanded<'_> {
 }
 
 impl<'a> Stepper<'a> {
-    /// The trials before their first step; agents have their first stimuli.
+    /// Creates the trials before their first step; agents have their first stimuli.
+    ///
+    /// # Errors
+    ///
+    /// If the range of trials is empty or beyond the limit, if an object finds no place, or if
+    /// the script fails.
     pub fn new(
         simulation: &'a Simulation,
         trial_set: TrialSet,
@@ -158,7 +164,7 @@ impl<'a> Stepper<'a> {
         self.commanded().flat_map(|group| group.robots.clone()).collect()
     }
 
-    /// Inputs of an agent: of the one that has most of them.
+    /// Number of inputs of an agent; the largest, if groups differ.
     pub fn n_inputs(&self) -> usize {
         self.commanded().map(|group| group.n_inputs).max().unwrap_or(0)
     }
@@ -168,13 +174,13 @@ impl<'a> Stepper<'a> {
         self.simulation.world.message_len
     }
 
-    /// Environment steps taken.
+    /// Number of environment steps so far.
     pub fn n_steps_done(&self) -> u32 {
         self.step
     }
 
-    /// What the agents get, `[trial][agent][input]`; NaN for inputs that an agent has not. After
-    /// the last step, that of the last step.
+    /// The stimuli of the agents, flattened, shape `[trial][agent][input]`; NaN for inputs that
+    /// an agent lacks. After the last step, those of the last step.
     pub fn stimuli(&self) -> Vec<f32> {
         let width = self.n_inputs();
         let mut values = Vec::with_capacity(self.trials.len() * self.n_agents * width);
@@ -186,9 +192,13 @@ impl<'a> Stepper<'a> {
         values
     }
 
-    /// Has the agents get something else in this step, `[trial][agent][input]`: what
-    /// [`decide`](Self::decide) sees. Radios still relay what they heard. Values of inputs that an
-    /// agent has not do not matter, and those of inhibited ones are zero.
+    /// Replaces the agents' stimuli in this step, which [`decide`](Self::decide) reads;
+    /// flattened, shape `[trial][agent][input]`. Radios still relay the frames that they heard.
+    /// Values of inputs that an agent lacks are ignored, and inhibited ones become zero.
+    ///
+    /// # Errors
+    ///
+    /// If the array has the wrong length, or a value that is not finite.
     pub fn set_stimuli(&mut self, stimuli: &[f32]) -> Result<(), StepError> {
         let width = self.n_inputs();
         let lanes = self.lanes_of_agents();
@@ -223,8 +233,12 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Has agents, `[trial][agent]`, emit nothing in this step, neither their own message nor a
-    /// frame that they relay: the next strongest are heard instead.
+    /// Silences agents in this step: they emit neither their own message nor a frame to relay,
+    /// and others hear the next strongest emitter instead. Flattened, shape `[trial][agent]`.
+    ///
+    /// # Errors
+    ///
+    /// If the array has the wrong length.
     pub fn silence(&mut self, silent: &[bool]) -> Result<(), StepError> {
         let (expected, actual) = (self.silent.len(), silent.len());
         if expected != actual {
@@ -234,8 +248,9 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Whether agents sent their own message in the step before, `[trial][agent]`: what their
-    /// actions said, but for the first steps and for perturbations.
+    /// Whether agents sent their own message in the previous step, flattened, shape
+    /// `[trial][agent]`. This follows their actions, except in the first steps and under
+    /// perturbations.
     pub fn sent(&self) -> Vec<bool> {
         let agents = self.agents();
         self.trials
@@ -244,7 +259,11 @@ impl<'a> Stepper<'a> {
             .collect()
     }
 
-    /// The network of a genotype, at rest, for as many trials.
+    /// The network of a genotype, at rest, for the trials of this stepper.
+    ///
+    /// # Errors
+    ///
+    /// If the genotype has the wrong length, or a gene outside \[0, 1\].
     pub fn policy(&self, genotype: &[f64]) -> Result<Policy<'a>, EvaluateError> {
         let simulation = self.simulation;
         let phenotype = simulation.phenotype(genotype)?;
@@ -259,8 +278,8 @@ impl<'a> Stepper<'a> {
         Ok(Policy { controllers: controllers.collect() })
     }
 
-    /// What the network has agents do in this step. It draws its random decisions from the
-    /// trials' streams, as in [`Simulation::simulate`]: to be asked once per step.
+    /// The network's actions for the agents in this step. It draws random decisions from the
+    /// trials' streams, as in [`Simulation::simulate`], so call it once per step.
     pub fn decide(&mut self, policy: &mut Policy<'_>) -> Actions {
         for (group, controller) in self.groups.iter().zip(&mut policy.controllers) {
             let Some(controller) = controller else { continue };
@@ -281,7 +300,13 @@ impl<'a> Stepper<'a> {
         actions
     }
 
-    /// One environment step. Returns its fitness in each trial, none where it does not count.
+    /// Runs one environment step. Returns its fitness in each trial; `None` where the step does
+    /// not count.
+    ///
+    /// # Errors
+    ///
+    /// If the episode has ended, if an action has the wrong length or range, or if the simulation
+    /// fails.
     pub fn step(&mut self, actions: &Actions) -> Result<Vec<Option<f64>>, StepError> {
         if self.step >= self.simulation.n_steps {
             return Err(StepError::Over(self.step));

@@ -7,7 +7,7 @@ use crate::controllers::Action;
 use crate::record::{ReceivedFrame, RobotRecord};
 use crate::torus::Vec2;
 
-/// Where robots are, what they do, and what they heard.
+/// Positions, actions and received frames of all robots.
 #[derive(Debug, Clone)]
 pub(crate) struct Swarm {
     /// Positions, cm.
@@ -30,7 +30,7 @@ pub(crate) struct Swarm {
     pub message_len: usize,
     /// Whether the controller gets light readings.
     pub photosensitive: Vec<bool>,
-    /// Whether it is out of order: it stands, its LED is off, nobody hears it.
+    /// Whether it has failed: it stands still, its LED is off, and no robot hears it.
     pub failed: Vec<bool>,
     /// Whether it carries something.
     pub carries: Vec<bool>,
@@ -49,12 +49,12 @@ pub(crate) struct Received {
     pub sector: usize,
     /// Logarithm of the frame's strength.
     pub log_strength: f64,
-    /// (cos, sin) of the receiving sector in the receiver's own frame.
+    /// (cos, sin) of the receiving sector in the receiver's own frame of reference.
     pub receiving_direction: Vec2,
-    /// (cos, sin) of the sending sector in the frame of the robot whose sector it is; zero
-    /// where it is not observed.
+    /// (cos, sin) of the sending sector in the frame of reference of the robot whose sector it
+    /// is; zero if it is not computed.
     pub sending_direction: Vec2,
-    /// Where it comes from, the sending direction filled in.
+    /// Its origin, with the sending direction.
     pub origin: FrameOrigin,
 }
 
@@ -66,7 +66,7 @@ impl Received {
 }
 
 impl Swarm {
-    /// At the start of a trial: nothing heard, everything off, mode send.
+    /// The swarm at the start of a trial: no frames received, everything off, mode send.
     pub fn new(positions: Vec<Vec2>, headings: Vec<f64>, message_len: usize) -> Self {
         let n = positions.len();
         Self {
@@ -87,7 +87,7 @@ impl Swarm {
         }
     }
 
-    /// Fills in what there is to see of a robot, except what its controller and the task know.
+    /// Fills in the record of a robot, except the data of its controller and of the task.
     pub fn record(&self, robot: usize, record: &mut RobotRecord) {
         let message = self.message_range(robot);
         record.position = self.positions[robot];
@@ -109,12 +109,12 @@ impl Swarm {
         record.target = None;
     }
 
-    /// Place of a robot's message in `messages` and `received_messages`.
+    /// Range of a robot's message in `messages` and `received_messages`.
     pub fn message_range(&self, robot: usize) -> Range<usize> {
         robot * self.message_len..(robot + 1) * self.message_len
     }
 
-    /// Robots out of order stand, with their LED off.
+    /// Stops failed robots, and turns their LEDs off.
     pub fn stop_failed(&mut self) {
         for robot in (0..self.failed.len()).filter(|&robot| self.failed[robot]) {
             self.wheels[robot] = [0.0; 2];
@@ -139,7 +139,7 @@ impl Swarm {
     }
 }
 
-/// Puts values into a list that has room for them already.
+/// Refills a list without another allocation.
 fn refill(list: &mut Vec<f64>, values: &[f64]) {
     list.clear();
     list.extend_from_slice(values);

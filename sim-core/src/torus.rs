@@ -73,7 +73,7 @@ fn wrap(x: f64, period: f64) -> f64 {
     if rest < period { rest } else { 0.0 }
 }
 
-/// A flat torus: what leaves on one side enters on the other.
+/// A flat torus: objects that leave on one side enter on the opposite side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Torus {
     /// Period along x, cm.
@@ -93,20 +93,20 @@ impl Torus {
         Vec2 { x: wrap(position.x, self.width), y: wrap(position.y, self.height) }
     }
 
-    /// The shortest way from `from` to `to`; both within the torus.
+    /// The shortest displacement from `from` to `to`; both within the torus.
     #[inline(always)]
     pub fn displacement(&self, from: Vec2, to: Vec2) -> Vec2 {
         Vec2 { x: shortest(to.x - from.x, self.width), y: shortest(to.y - from.y, self.height) }
     }
 
-    /// Length of the shortest way between two positions.
+    /// Length of the shortest displacement between two positions, cm.
     pub fn distance(&self, a: Vec2, b: Vec2) -> f64 {
         self.displacement(a, b).norm()
     }
 
-    /// Centre of mass of positions: the mean of the shortest ways from the first
-    /// one. It is that of the plane for what extends over less than half the
-    /// world. The origin without positions.
+    /// Centre of mass of positions: the mean of the shortest displacements from the first one. It
+    /// equals the centre in the plane if the positions extend over less than half the world.
+    /// Returns the origin without positions.
     pub fn centroid(&self, positions: &[Vec2]) -> Vec2 {
         let Some(&first) = positions.first() else { return Vec2::default() };
         let sum = positions.iter().fold(Vec2::default(), |sum, &position| {
@@ -123,7 +123,7 @@ impl Torus {
 #[inline(always)]
 fn shortest(difference: f64, period: f64) -> f64 {
     let half = 0.5 * period;
-    // Without a branch: where somebody is, is not to be foreseen.
+    // Without a branch, because positions are unpredictable.
     let above = if difference > half { period } else { 0.0 };
     let below = if difference < -half { period } else { 0.0 };
     difference - above + below

@@ -1,5 +1,4 @@
-//! One trial of an experiment: the phases of its environment steps, except what
-//! controllers do.
+//! One trial of an experiment: the phases of its environment steps, except the controllers.
 
 mod address;
 
@@ -41,35 +40,35 @@ pub(crate) struct Trial<'a> {
     light_paths: Vec<LightPath>,
     areas: Vec<Vec2>,
     switches: Switches,
-    /// What each group of robots has beside the swarm's state.
+    /// The state of each group of robots, in addition to the swarm's.
     groups: Vec<Group>,
-    /// Stochastic decoding, per robot.
+    /// Streams for stochastic decoding, per robot.
     decoding: Vec<Stream>,
-    /// None: the script computes it.
+    /// `None`: the script computes the fitness.
     fitness: Option<Box<dyn Fitness>>,
     script: Option<ScriptRun<'a>>,
-    /// Whether to go on; a script that is stopped fails.
+    /// Whether to continue; a stopped script fails.
     goes_on: &'a dyn Fn() -> bool,
     n_steps: u32,
     /// Fitness of the last step, 0 if it does not count.
     reward: f64,
     fitness_sum: f64,
     n_scored_steps: u32,
-    /// Fitness of the whole episode, if that is not the mean over the steps.
+    /// Fitness of the whole episode, if it is not the mean over the steps.
     of_episode: Option<f64>,
 }
 
-/// What belongs to a group of robots.
+/// The state of a group of robots.
 pub(crate) struct Group {
-    /// What they perceive.
+    /// Their readings.
     pub senses: Senses,
-    /// What goes wrong.
+    /// Their perturbations.
     pub perturbations: Perturbations,
-    /// Start positions, and those after each switch of the topology.
+    /// Stream for start positions, and for those after each switch of the topology.
     positions: Stream,
 }
 
-/// What encoders of a group's robots draw from, trial by trial; nothing if none draws.
+/// Random streams of the encoders of a group's robots, trial by trial; empty if no encoder draws.
 pub(crate) fn encoding_streams(
     simulation: &Simulation,
     trials: &[Trial<'_>],
@@ -85,7 +84,7 @@ pub(crate) fn encoding_streams(
     trials.iter().flat_map(of_trial).collect()
 }
 
-/// Draws where all objects of a trial start; fails where [`Trial::new`] does.
+/// Draws the start positions of all objects of a trial; fails where [`Trial::new`] does.
 pub(crate) fn try_places(
     simulation: &Simulation,
     trial_set: TrialSet,
@@ -100,7 +99,7 @@ pub(crate) fn try_places(
 }
 
 impl<'a> Trial<'a> {
-    /// The trial before its first step. When `goes_on` says no, a script fails at once.
+    /// The trial before its first step. Once `goes_on` returns false, a script fails at once.
     pub fn new(
         simulation: &'a Simulation,
         trial_set: TrialSet,
@@ -181,12 +180,12 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// Start of a step: every robot senses, from positions and headings now and
-    /// from the frames that are on the air. The script plans what its robots do.
+    /// Start of a step: every robot senses, with present positions and headings and the frames on
+    /// the air. The script plans the actions of its robots.
     pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
         let mut moved = mem::replace(&mut self.swarm.moved, false);
         let turned = mem::replace(&mut self.swarm.turned, false);
-        // Robots whose topology switches find themselves elsewhere.
+        // A switch of the topology moves robots elsewhere.
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
             if state.perturbations.switches_topology(step) {
                 let torus = &self.world.torus;
@@ -196,8 +195,8 @@ impl<'a> Trial<'a> {
                 moved = true;
             }
         }
-        // Neighbours change only when a robot moves, and who hears whom when a
-        // robot moves or turns.
+        // Neighbours change only when a robot moves, and hearing only when a robot moves or
+        // turns.
         if moved {
             self.neighbours.update(&self.world.torus, &self.swarm.positions);
         }
@@ -221,7 +220,7 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// The script says what robots with a `script_sensor` sense.
+    /// The script computes the readings of robots with a `script_sensor`.
     fn sense_by_script(&mut self, step: u32) -> Result<(), EvaluateError> {
         self.run_script(step, ScriptRun::sense)?;
         for (robot, reading) in self.script.iter().flat_map(ScriptRun::sensed) {
@@ -246,7 +245,7 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Puts zeros where stimuli of a group, which somebody else has filled in, are inhibited.
+    /// Zeroes inhibited stimuli of a group that the caller has filled in.
     pub fn inhibit(&self, group: usize, first_lane: usize, stimuli: &mut Lanes) {
         let perturbations = &self.groups[group].perturbations;
         let group = &self.world.groups[group];
@@ -258,7 +257,7 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Tells a group's controller what its robots are rewarded with for the step before.
+    /// Gives a group's controller the rewards of its robots for the previous step.
     pub fn reward(&self, group: usize, first_lane: usize, controller: &mut dyn Controller) {
         let n_robots = self.world.groups[group].robots.len();
         (first_lane..first_lane + n_robots).for_each(|lane| controller.reward(lane, self.reward));
@@ -276,7 +275,7 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Adds what robots were decided to do in this step.
+    /// Adds the decided actions of robots in this step.
     pub fn add_actions(&self, robots: Range<usize>, actions: &mut Actions) {
         for robot in robots {
             actions.wheels.push(self.swarm.wheels[robot]);
@@ -286,16 +285,16 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Whether a robot sent its own message in the step that was scored last.
+    /// Whether a robot sent its own message in the last scored step.
     pub fn has_sent(&self, robot: usize) -> bool {
         self.swarm.modes[robot] == Mode::Send
     }
 
-    /// Actions take effect and are scored: fitness of the step, none if it does not
+    /// Carries out and scores the actions; returns the fitness of the step, `None` if it does not
     /// count.
     pub fn act(&mut self, step: u32) -> Result<Option<f64>, EvaluateError> {
         let world = self.world;
-        // Frames have to spread before relaying them makes sense.
+        // Frames have to spread before relaying makes sense.
         for group in world.groups.iter().filter(|group| step < group.sending_steps) {
             self.swarm.modes[group.robots.clone()].fill(Mode::Send);
         }
@@ -324,28 +323,28 @@ impl<'a> Trial<'a> {
         Ok(fitness)
     }
 
-    /// The script says what happens to robots, lights and areas after the actions.
+    /// The script changes robots, lights and areas after the actions.
     fn react(&mut self, step: u32) -> Result<(), EvaluateError> {
         if self.run_script(step, ScriptRun::react)?.is_some()
             && self.radio.mute(self.world, &self.swarm.failed)
         {
-            // Others are the loudest now.
+            // Other robots are the loudest now.
             self.swarm.turned = true;
         }
         Ok(())
     }
 
-    /// These robots, too, are not heard in the step to come.
+    /// Silences further robots in the next step.
     pub fn silence(&mut self, robots: impl Iterator<Item = usize>) {
         let mut silent = self.swarm.failed.clone();
         robots.for_each(|robot| silent[robot] = true);
         if self.radio.mute(self.world, &silent) {
-            // Others are the loudest now.
+            // Other robots are the loudest now.
             self.swarm.turned = true;
         }
     }
 
-    /// Has the script look at this step, if there is one.
+    /// Runs a function of the script on this step, if there is a script.
     fn run_script<T>(
         &mut self,
         step: u32,
@@ -369,7 +368,7 @@ impl<'a> Trial<'a> {
         run(script, view).map(Some).map_err(|error| self.address.failed(error, step))
     }
 
-    /// The last step is over.
+    /// Ends the episode after its last step.
     pub fn end(&mut self) -> Result<(), EvaluateError> {
         if self.fitness.is_none() {
             let last = self.n_steps.saturating_sub(1);
@@ -387,7 +386,7 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// Fills in the measures of the step that was scored last.
+    /// Fills in the measures of the last scored step.
     pub fn measure(&mut self, step: u32, measures: &mut Measures) -> Result<(), EvaluateError> {
         measures.clear();
         if let Some(fitness) = &self.fitness {
@@ -398,7 +397,7 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// Fills in the step that was scored last, without what controllers keep.
+    /// Fills in the last scored step, without the data of controllers.
     pub fn record(
         &mut self,
         step: u32,
@@ -422,7 +421,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Fitness of the episode: the mean over the steps that count, 0 without any, unless the
-    /// script says otherwise.
+    /// script computes it.
     pub fn fitness(&self) -> f64 {
         if let Some(fitness) = self.of_episode {
             fitness

@@ -1,4 +1,4 @@
-//! The world as compiled: what is the same for all its episodes.
+//! The compiled world, which all episodes share.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ use experiment_file::{
 /// Communication range of robots without radio, cm.
 const DEFAULT_RANGE: f64 = 100.0;
 
-/// A torus and what is in it.
+/// A torus and its objects.
 #[derive(Debug, Clone)]
 pub(crate) struct World {
     /// The plane.
@@ -29,7 +29,7 @@ pub(crate) struct World {
     pub antennas: Vec<Antenna>,
     /// Lights, object by object.
     pub lights: Vec<StaticObjects>,
-    /// How the lights of each object move.
+    /// The motion of the lights of each object.
     pub light_controllers: Vec<LightController>,
     /// Ground areas, object by object.
     pub areas: Vec<StaticObjects>,
@@ -37,39 +37,38 @@ pub(crate) struct World {
     pub message_len: usize,
     /// Index in `groups` of the robots that evolve and are evaluated.
     pub evolvable: usize,
-    /// What the border of the swarm is the alpha shape of, with the world's width as unit of
-    /// length.
+    /// The parameter alpha of the swarm's border, in units of 1 / world width.
     pub alpha: f64,
 }
 
 /// The robots of one object.
 #[derive(Debug, Clone)]
 pub(crate) struct RobotGroup {
-    /// Where they come from.
+    /// Their object and start positions.
     pub site: Site,
-    /// Where they look at first.
+    /// Their start headings.
     pub headings: Headings,
     /// Their numbers among all robots.
     pub robots: Range<usize>,
-    /// What decides their actions.
+    /// Their controller.
     pub controller: RobotController,
-    /// What their controller gets, and in which of its inputs.
+    /// The readings that their controller gets, each with its range of inputs.
     pub stimuli: Vec<(SensorQuery, Range<usize>)>,
-    /// All readings that they have, each with its number of values.
+    /// All their readings, each with its number of values.
     pub readings: Vec<(SensorQuery, usize)>,
-    /// Sensors beside the radio, in the order in which they draw noise.
+    /// Their sensors except the radio, in the order in which they draw noise.
     pub sensors: Vec<MountedSensor>,
-    /// Their wheels; none: they stand.
+    /// Their wheels; `None`: they stand still.
     pub drive: Option<Drive>,
     /// Whether they have an LED.
     pub has_led: bool,
-    /// What quantises their messages.
+    /// The quantiser of their messages.
     pub quantiser: Option<Quantiser>,
-    /// Steps at the start of an episode in which they send, whatever their network says.
+    /// Number of steps at the start of an episode in which they always send.
     pub sending_steps: u32,
     /// Whether each has a frame on the air before the first step.
     pub initial_frame: bool,
-    /// What goes wrong.
+    /// Their perturbations.
     pub perturbations: PerturbationsConfig,
 }
 
@@ -81,15 +80,15 @@ impl RobotGroup {
 }
 
 impl World {
-    /// Where objects come from.
+    /// The sites of all objects.
     pub fn sites(&self) -> impl Iterator<Item = &Site> {
         let static_objects = self.lights.iter().chain(&self.areas);
         let robots = self.groups.iter().map(|group| &group.site);
         robots.chain(static_objects.map(|objects| &objects.site))
     }
 
-    /// Compiles the objects, of which `algorithm.evolvable_object` names the robots that
-    /// are evaluated; none if there are no such robots.
+    /// Compiles the objects; `algorithm.evolvable_object` names the robots to evaluate. `None` if
+    /// there are no such robots.
     pub fn compile(
         config: &WorldConfig,
         algorithm: &AlgorithmConfig,
@@ -108,7 +107,7 @@ impl World {
             evolvable: 0,
             alpha: algorithm.fitness_params.alpha,
         };
-        // Sensors refer to lights and areas, which may come after their robots.
+        // Sensors refer to lights and areas, which may come later than their robots.
         for (index, (name, object)) in config.objects.iter().enumerate() {
             match object {
                 ObjectConfig::Robot(_) => {}
@@ -132,7 +131,7 @@ impl World {
         Some(Self { evolvable: evolvable?, ..world })
     }
 
-    /// The group that a robot is of.
+    /// The group of a robot.
     pub fn group_of(&self, robot: usize) -> usize {
         let group = self.groups.iter().position(|group| group.robots.contains(&robot));
         group.expect("every robot is of a group")
@@ -277,7 +276,7 @@ impl World {
     }
 }
 
-/// What robots with these sensors can read, with the number of values of each reading.
+/// The readings of robots with these sensors, each with its number of values.
 fn readings(sensors: &SensorsConfig) -> Vec<(SensorQuery, usize)> {
     let reading = |&query: &SensorQuery| Some((query, sensors.reading_len(query)? as usize));
     SensorQuery::ALL.iter().filter_map(reading).collect()

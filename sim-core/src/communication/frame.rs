@@ -2,35 +2,35 @@
 
 use crate::torus::Vec2;
 
-/// Where a frame's message comes from.
+/// The origin of a frame's message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameOrigin {
     /// The robot whose message it is.
     pub originator: usize,
-    /// Emissions so far, from 1.
+    /// Number of emissions so far, from 1.
     pub hops: u32,
-    /// In which direction the originator sent it, in the originator's own frame,
-    /// as the first relaying robot observed it; zero (none) on the first hop.
+    /// Direction in which the originator sent it, in the originator's own frame of reference, as
+    /// the first relaying robot observed it; zero (none) on the first hop.
     pub sending_direction: Vec2,
 }
 
 impl FrameOrigin {
-    /// Of a frame that a robot emitted which had nothing to relay: it has made more hops than
-    /// any receiver accepts.
+    /// The origin of a frame from a robot that had nothing to relay: it has more hops than any
+    /// receiver accepts.
     pub const NOTHING: Self =
         Self { originator: usize::MAX, hops: u32::MAX, sending_direction: Vec2::new(0.0, 0.0) };
 
-    /// Of a robot's own message.
+    /// The origin of a robot's own message.
     pub fn sent_by(originator: usize) -> Self {
         Self { originator, hops: 1, sending_direction: Vec2::default() }
     }
 }
 
-/// All frames on the air. Frame r is robot r's. Where there is none, it is the same for
-/// receivers as one that comes from nothing.
+/// All frames on the air. Frame r belongs to robot r. To receivers, a missing frame looks like
+/// one with the origin [`FrameOrigin::NOTHING`].
 #[derive(Debug, Clone)]
 pub(crate) struct Ether {
-    /// Of each robot's frame; and of the frame of nobody, who has the number after theirs.
+    /// Origins of all robots' frames, and then of a missing frame.
     origins: Vec<FrameOrigin>,
     /// `[robot][component]`
     messages: Vec<f64>,
@@ -38,7 +38,7 @@ pub(crate) struct Ether {
 }
 
 impl Ether {
-    /// No frame is on the air.
+    /// An ether without frames.
     pub fn new(n_robots: usize, message_len: usize) -> Self {
         Self {
             origins: vec![FrameOrigin::NOTHING; n_robots + 1],
@@ -47,13 +47,13 @@ impl Ether {
         }
     }
 
-    /// Where a robot's frame comes from; nobody's comes from nothing.
+    /// The origin of a robot's frame; `NOTHING` for the number after the last robot.
     pub fn origin(&self, emitter: usize) -> FrameOrigin {
         self.origins[emitter]
     }
 
-    /// Whether a robot that accepts less than `max_hops` hops takes the frame of another one,
-    /// or of nobody.
+    /// Whether a receiver that accepts fewer than `max_hops` hops accepts a robot's frame, which
+    /// may be missing.
     pub fn is_valid(&self, emitter: usize, receiver: usize, max_hops: u32) -> bool {
         let FrameOrigin { originator, hops, .. } = self.origins[emitter];
         (originator != receiver) & (hops < max_hops)

@@ -1,5 +1,5 @@
-//! Who hears whom, in which sector and how strongly. It depends on positions and
-//! headings alone, so it is computed again only when a robot has moved or turned.
+//! Finds the strongest emitter in every sector of every robot. This depends only on positions and
+//! headings, so it is recomputed only after a robot has moved or turned.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -12,26 +12,27 @@ use crate::torus::{Vec2, angular_difference, sector_angle, wrap_angle};
 use determinism::Isa;
 use experiment_file::SendingDirection;
 
-/// A border between sectors belongs to both in spite of rounding, radians.
+/// Tolerance of sector borders, radians, so that a border belongs to both sectors in spite of
+/// rounding.
 const BORDER: f64 = 1e-12;
 
-/// What a robot's receiver and transmitter are like.
+/// The properties of a robot's receiver and transmitter.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Antenna {
-    /// Reach of the transmitter, cm; none: it does not emit.
+    /// Reach of the transmitter, cm; `None`: the robot does not emit.
     pub emits_within: Option<f64>,
-    /// The receiver; none: it does not listen.
+    /// The receiver; `None`: the robot does not listen.
     pub receiver: Option<Receiver>,
 }
 
 impl Antenna {
-    /// How far it is heard, cm; negative: nowhere.
+    /// Distance within which it is heard, cm; negative: nowhere.
     pub fn reach(&self) -> f64 {
         self.emits_within.unwrap_or(-1.0)
     }
 }
 
-/// What a receiver is like.
+/// The properties of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Receiver {
     /// Sectors, n.
@@ -40,22 +41,21 @@ pub(crate) struct Receiver {
     pub range: f64,
     /// Fading of the strength.
     pub decay: Decay,
-    /// Frames of so many hops are not accepted.
+    /// Frames with this many hops are not accepted.
     pub max_hops: u32,
-    /// Whose sector the sending direction is.
+    /// The robot whose sector is the sending direction.
     pub sending_direction: SendingDirection,
-    /// Whether sending directions are observed: only if a robot's network gets them.
+    /// Whether to compute sending directions, which only some networks get.
     pub observes_sending_direction: bool,
 }
 
-/// Robots whose neighbours are listened to together: few enough for what is noted of them to stay
-/// in the cache.
+/// Number of robots to process together, few enough for their scratch data to stay in the cache.
 const N_LISTENERS_AT_ONCE: usize = 128;
 
 /// The strongest emitter in a sector of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Heard {
-    /// The robot that is heard; the number of robots if there is none.
+    /// The emitting robot; the number of robots if there is none.
     pub robot: u32,
     /// Its place among the neighbours.
     place: u32,
@@ -65,38 +65,38 @@ pub(crate) struct Heard {
 /// frame on the air in each step, so it is also the sector's frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Hearing {
-    /// Those that hear.
+    /// Groups of robots with receivers.
     listeners: Vec<Listeners>,
     /// Reach of every robot's transmitter, cm; below 0 if it does not emit.
     reaches: Vec<f64>,
     emitters: Emitters,
 }
 
-/// Robots with neighbouring numbers whose receivers are alike.
+/// Robots with consecutive numbers and equal receivers.
 #[derive(Debug, Clone)]
 pub(crate) struct Listeners {
     /// Their numbers.
     robots: Range<usize>,
-    /// What each of them has.
+    /// The receiver of each.
     pub receiver: Receiver,
     /// The strongest emitters, `[robot][sector]`.
     heard: Vec<Heard>,
-    /// Direction of each sector in its robot's own frame.
+    /// Direction of each sector in its robot's own frame of reference.
     angles: Vec<f64>,
     /// (cos, sin) of `angles`.
     pub directions: Vec<Vec2>,
 }
 
-/// Scratch: the neighbours of some listeners, as these hear them.
+/// Scratch: the neighbours of some listeners, from the listeners' view.
 #[derive(Debug, Clone, Default)]
 struct Emitters {
-    /// Direction in the listener's own frame.
+    /// Direction in the listener's own frame of reference.
     bearings: Vec<f64>,
     /// Sector whose direction is nearest.
     sectors: Vec<u32>,
     /// Logarithm of their strength.
     log_strengths: Vec<f64>,
-    /// Whether any is on the border of two sectors.
+    /// Whether any neighbour is on the border of two sectors.
     is_any_on_border: bool,
     /// The loudest in each sector of a robot.
     loudest: Vec<Loudest>,
@@ -110,8 +110,8 @@ struct Loudest {
 }
 
 impl Loudest {
-    /// Makes an emitter the loudest if it is heard and louder, or as loud and of a lower
-    /// number. That is not to be foreseen, so there is no branch.
+    /// Makes an emitter the loudest if it is heard and louder, or equally loud with a lower
+    /// number. The outcome is unpredictable, so the code has no branch.
     #[inline(always)]
     fn hear(&mut self, log_strength: f64, emitter: Heard, is_heard: bool) {
         let is_first = (log_strength == self.log_strength) & (emitter.robot < self.heard.robot);
@@ -139,26 +139,26 @@ impl Hearing {
         Self { listeners, reaches: reaches.collect(), emitters: Emitters::default() }
     }
 
-    /// Those that hear.
+    /// Groups of robots with receivers.
     pub fn listeners(&self) -> &[Listeners] {
         &self.listeners
     }
 
-    /// Has robots be heard within so far, cm; negative: not at all.
+    /// Sets the distances within which robots are heard, cm; negative: not at all.
     pub fn set_reaches(&mut self, reaches: impl Iterator<Item = f64>) {
         self.reaches.clear();
         self.reaches.extend(reaches);
     }
 
-    /// Computes everything from who is near whom and from headings.
+    /// Computes everything from neighbours and headings.
     pub fn update(&mut self, neighbours: &Neighbours, headings: &[f64]) {
         for listeners in &mut self.listeners {
             listeners.update(&self.reaches, &mut self.emitters, neighbours, headings);
         }
     }
 
-    /// (cos, sin) of the sector of an emitter that faces its listener, in the emitter's own
-    /// frame.
+    /// (cos, sin) of the emitter's sector that faces the listener, in the emitter's own frame of
+    /// reference.
     pub fn sending_direction(
         &self,
         listener: &Listeners,
@@ -168,7 +168,7 @@ impl Hearing {
     ) -> Vec2 {
         let emitter = heard.robot as usize;
         let listens = |listeners: &&Listeners| listeners.robots.contains(&emitter);
-        // What cannot listen has as many sectors as its listener.
+        // An emitter without a receiver has as many sectors as its listener.
         let Listeners { angles, directions, .. } =
             self.listeners.iter().find(listens).unwrap_or(listener);
         let reverse = neighbours.get(heard.place as usize).reverse_bearing();
@@ -186,12 +186,12 @@ impl Listeners {
         Self { robots, receiver, heard, angles, directions }
     }
 
-    /// Each robot with what it hears, sector by sector.
+    /// Each robot with the strongest emitter in each of its sectors.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &[Heard])> {
         self.robots.clone().zip(self.heard.chunks_exact(self.angles.len()))
     }
 
-    /// Logarithm of the strength of what a robot hears in a sector.
+    /// Logarithm of the strength of the emitter in a robot's sector.
     pub fn log_strength(
         &self,
         robot: usize,
@@ -225,7 +225,7 @@ impl Listeners {
 }
 
 impl Emitters {
-    /// The neighbours of some robots, as these hear them.
+    /// Computes the neighbours of some robots, from the robots' view.
     fn locate(
         &mut self,
         receiver: Receiver,
@@ -244,7 +244,7 @@ impl Emitters {
         Isa::best().run(Complete { emitters: self, receiver, rho });
     }
 
-    /// Chooses the loudest of those in each sector of the robots: `heard`, `[robot][sector]`.
+    /// Chooses the loudest neighbour in each sector of the robots: `heard`, `[robot][sector]`.
     fn choose(
         &mut self,
         receiver: Receiver,
@@ -287,7 +287,7 @@ impl Emitters {
     }
 }
 
-/// Places of the neighbours of some robots.
+/// Range of the neighbours of some robots.
 fn places(neighbours: &Neighbours, robots: &Range<usize>) -> Range<usize> {
     neighbours.places(robots.start).start..neighbours.places(robots.end - 1).end
 }
@@ -344,8 +344,8 @@ fn is_on_border(angle: f64, nearest: f64, sectors: &[f64]) -> bool {
     angular_difference(angle, nearest) >= half_width(sectors) - BORDER
 }
 
-/// The sector, of those with the given directions, that is nearest to an angle in
-/// \[0, 2 pi); on ties the one of the lower index.
+/// Index of the sector whose direction is nearest to an angle in \[0, 2 pi); the lower index wins
+/// ties.
 fn facing(angle: f64, sectors: &[f64]) -> usize {
     let n_sectors = sectors.len() as f64;
     let nearest = (angle * n_sectors / TAU + 0.5) as usize;
@@ -383,7 +383,7 @@ mod tests {
         }),
     };
 
-    /// Robots that hear each other, with where they are and where they look.
+    /// Robots that hear each other, with positions and headings.
     struct Scene {
         neighbours: Neighbours,
         headings: Vec<f64>,
@@ -401,7 +401,7 @@ mod tests {
     }
 
     impl Scene {
-        /// Robots of a kind, and what one of them hears.
+        /// The group of a robot, and its strongest emitters.
         fn heard_by(&self, robot: usize) -> (&Listeners, &[Heard]) {
             let kinds = self.hearing.listeners().iter();
             let mut robots =
@@ -410,7 +410,7 @@ mod tests {
             found.map(|(kind, (_, heard))| (kind, heard)).expect("it listens")
         }
 
-        /// Whom a robot hears, sector by sector.
+        /// The emitters that a robot hears, sector by sector.
         fn emitters(&self, robot: usize) -> Vec<Option<usize>> {
             let emitter = |heard: &Heard| {
                 let robot = heard.robot as usize;
@@ -428,13 +428,13 @@ mod tests {
 
     #[test]
     fn strength_and_directions_match_a_case_by_hand() {
-        // 50 cm away, 53.13 degrees to the left; the other one looks up.
+        // 50 cm away, 53.13 degrees to the left; the other robot looks up.
         let robots = [(990.0, 500.0, 0.0), (20.0, 540.0, FRAC_PI_2)];
         let scene = scene(&[ANTENNA; 2], &robots);
         assert_eq!(scene.emitters(0), [None, Some(1), None, None]);
         let phi = FRAC_PI_2 - libm::atan2(4.0, 3.0);
         assert!((scene.strength(0, 1) - libm::exp(-2.5 - phi)).abs() < 1e-15);
-        // Seen from the other: 143.13 degrees to its left, nearest to 180.
+        // Seen from the other robot: 143.13 degrees to its left, nearest to 180.
         let (kind, heard) = scene.heard_by(0);
         let (neighbours, headings) = (&scene.neighbours, &scene.headings);
         let sending_direction =

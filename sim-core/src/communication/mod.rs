@@ -12,13 +12,13 @@ pub(crate) use radio::Radio;
 
 use serde::Serialize;
 
-/// What a robot does with its transmitter.
+/// The mode of a robot's transmitter.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
     /// Emits its own message.
     #[default]
     Send,
-    /// Passes on the frame that it received.
+    /// Relays the frame that it received.
     Relay,
 }

@@ -1,4 +1,4 @@
-//! Messages become symbols of a lattice (Eq. 3.13 and 3.14, Algorithm 4).
+//! Quantises messages to symbols of a lattice (Eq. 3.13 and 3.14, Algorithm 4).
 
 use std::f64::consts::LOG2_E;
 
@@ -19,13 +19,13 @@ pub(crate) struct Quantiser {
     points: Vec<f64>,
 }
 
-/// Memory of a quantiser at work.
+/// Scratch memory of a quantiser.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Scratch(Vec<f32>);
 
 impl Quantiser {
-    /// The lattice of messages of length M with `n_levels` levels i/(K-1) per
-    /// component, 2 at least.
+    /// The lattice of messages of length M = `message_len` with K = `n_levels` >= 2 levels
+    /// i/(K-1) per component.
     pub fn new(message_len: usize, n_levels: usize, beta: f64) -> Self {
         debug_assert!(n_levels >= 2, "one level says nothing");
         let n_points = (0..message_len).fold(1, |n, _| n * n_levels);
@@ -52,7 +52,7 @@ impl Quantiser {
     }
 }
 
-/// Quantisation of at most one vector of robots.
+/// Quantises the messages of at most one vector of robots.
 struct Quantise<'a> {
     quantiser: &'a Quantiser,
     messages: &'a mut [f64],
@@ -110,7 +110,7 @@ impl WithSimd for Quantise<'_> {
         weights[0] = n_passed;
         let symbols = &memory[(n_components + 1) * S::F32_LANES..];
         for (message, &symbol) in messages.chunks_exact_mut(n_components).zip(symbols) {
-            // Rounding may let u pass them all.
+            // By rounding, u may pass all of them.
             let symbol = (symbol as usize).min(n_points - 1);
             let point = &quantiser.points[symbol * n_components..][..n_components];
             message.copy_from_slice(point);
@@ -118,8 +118,8 @@ impl WithSimd for Quantise<'_> {
     }
 }
 
-/// The middle of the interval of width 2^-23 in which a number of \[0, 1) lies:
-/// exact in f32, below 1, and above the weights of points that are far away.
+/// The middle of the interval of width 2^-23 that contains a number in \[0, 1): exact in f32,
+/// below 1, and larger than the weights of distant points.
 fn middle(u: f64) -> f32 {
     const N_INTERVALS: f64 = (1 << 23) as f64;
     (((u * N_INTERVALS).floor() + 0.5) / N_INTERVALS) as f32

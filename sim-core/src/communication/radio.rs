@@ -1,5 +1,5 @@
-//! All robots' radios in one trial: what is on the air, who hears it, and what
-//! chance decides.
+//! All robots' radios in one trial: the frames on the air, their receivers, and the random
+//! choices.
 
 use super::Mode;
 use super::frame::{Ether, FrameOrigin};
@@ -18,16 +18,16 @@ use experiment_file::SendingDirection;
 pub(crate) struct Radio {
     ether: Ether,
     hearing: Hearing,
-    /// Who is not heard.
+    /// Whether each robot is not heard.
     silent: Vec<bool>,
-    /// Per robot.
+    /// Streams for the choice among valid frames, per robot.
     reception: Vec<Stream>,
-    /// Per robot.
+    /// Streams for quantisation, per robot.
     quantisation: Vec<Stream>,
-    /// What the quantiser's draws are, for a group.
+    /// The draws of a group's quantiser.
     u: Vec<f64>,
     scratch: Scratch,
-    /// Sectors whose strongest frame is valid, for a robot.
+    /// The sectors of a robot whose strongest frame is valid.
     valid: Vec<usize>,
 }
 
@@ -51,13 +51,13 @@ impl Radio {
         }
     }
 
-    /// Robots have taken their places, moved or turned.
+    /// Updates the hearing after robots have started, moved or turned.
     pub fn listen(&mut self, neighbours: &Neighbours, swarm: &Swarm) {
         self.hearing.update(neighbours, &swarm.headings);
     }
 
-    /// Those who have failed, or are silent otherwise, are not heard. Returns whether this is
-    /// another set of robots than before.
+    /// Mutes robots that have failed or are silent. Returns whether the set of muted robots has
+    /// changed.
     pub fn mute(&mut self, world: &World, silent: &[bool]) -> bool {
         if self.silent == silent {
             return false;
@@ -69,8 +69,8 @@ impl Radio {
         true
     }
 
-    /// Every receiver takes a frame from the air: one uniformly chosen among the
-    /// sectors whose strongest frame is valid.
+    /// Every receiver takes a frame from the air, chosen uniformly among the sectors whose
+    /// strongest frame is valid.
     pub fn receive(&mut self, neighbours: &Neighbours, swarm: &mut Swarm) {
         let Self { ether, hearing, reception, valid, .. } = self;
         for listeners in hearing.listeners() {
@@ -79,7 +79,7 @@ impl Radio {
             for (robot, heard) in listeners.iter() {
                 let mut n_valid = 0;
                 for (sector, heard) in heard.iter().enumerate() {
-                    // Without a branch: which ones are valid is not to be foreseen.
+                    // Without a branch, because the result is unpredictable.
                     valid[n_valid] = sector;
                     let is_valid = ether.is_valid(heard.robot as usize, robot, receiver.max_hops);
                     n_valid += usize::from(is_valid);

@@ -8,9 +8,9 @@ use determinism::random::Stream;
 /// Wheel action per mean reading of a half.
 const GAIN: f32 = 5.0;
 
-/// a_r = clip(5 * mean of sectors 1..=n/2), a_l = clip(5 * mean of sectors
-/// n-n/2..n), with n/2 rounded down: sector 0 looks ahead and steers nowhere, and
-/// of an even number the one that looks back is in both halves.
+/// a_r = clip(5 * mean of sectors 1..=n/2), a_l = clip(5 * mean of sectors n-n/2..n), with n/2
+/// rounded down: sector 0 looks ahead and belongs to no half; with an even number, the sector
+/// that looks back belongs to both.
 #[derive(Debug)]
 pub(crate) struct BraitenbergLightFollower {
     n_sectors: usize,
@@ -19,7 +19,7 @@ pub(crate) struct BraitenbergLightFollower {
 }
 
 impl BraitenbergLightFollower {
-    /// Standing still. Its stimuli are the light sensor's sectors.
+    /// A vehicle at rest. Its stimuli are the light sensor's sectors.
     pub fn new(n_sectors: usize, n_lanes: usize) -> Self {
         Self { n_sectors, wheels: Lanes::new(2, n_lanes) }
     }

@@ -1,4 +1,4 @@
-//! What decides robots' actions.
+//! The controllers, which decide the actions of robots.
 
 mod braitenberg;
 mod neural;
@@ -10,18 +10,16 @@ use crate::communication::Mode;
 use crate::lanes::Lanes;
 use determinism::random::Stream;
 
-/// Decides for all robots of one object of the world, in all trials at once: one
-/// lane per robot and trial.
+/// Decides for all robots of one object of the world in all trials, one lane per robot and trial.
 pub(crate) trait Controller {
-    /// Takes in what a lane is rewarded with for the step before.
+    /// Gives a lane its reward for the previous step.
     fn reward(&mut self, _lane: usize, _reward: f64) {}
 
-    /// Takes in one environment step's stimuli, `[input][lane]`.
+    /// Gives the controller the stimuli of one environment step, `[input][lane]`.
     fn perceive(&mut self, stimuli: &Lanes);
 
-    /// Sets the actions of one lane; `action` holds the defaults. `stream` is the
-    /// robot's own for stochastic decisions, from which every step draws the same
-    /// number of values.
+    /// Sets the actions of one lane; `action` holds the defaults. `stream`: the robot's stream
+    /// for stochastic decisions; every step draws the same number of values from it.
     fn act(&mut self, lane: usize, stream: &mut Stream, action: &mut Action<'_>);
 
     /// Activities of its neurons, `[neuron][lane]`, if it has any.
@@ -35,7 +33,7 @@ pub(crate) trait Controller {
     }
 }
 
-/// Leaves everything to the script, whose plans the trial has.
+/// Leaves all decisions to the script, whose plans the trial has.
 pub(crate) struct Scripted;
 
 impl Controller for Scripted {

@@ -1,4 +1,4 @@
-//! Robots run by the network that a genotype encodes.
+//! The controller that runs the network of a genotype.
 
 use super::{Action, Controller};
 use crate::lanes::Lanes;
@@ -20,8 +20,8 @@ pub(crate) struct NeuralController<'a> {
 }
 
 impl<'a> NeuralController<'a> {
-    /// At rest in every lane. `streams`: what encoders draw from, per lane; none if none
-    /// draws.
+    /// A controller at rest in every lane. `streams`: the encoders' random streams, one per lane;
+    /// empty if no encoder draws.
     pub fn new(
         isa: Isa,
         network: &'a Network,
@@ -40,7 +40,7 @@ const MAX_REWARD: f64 = 1e6;
 
 impl Controller for NeuralController<'_> {
     fn reward(&mut self, lane: usize, reward: f64) {
-        // A script's fitness may be no number.
+        // A script's fitness may be NaN.
         let reward = if reward.is_nan() { 0.0 } else { reward.clamp(-MAX_REWARD, MAX_REWARD) };
         self.state.reward(lane, reward as f32);
     }

@@ -1,4 +1,4 @@
-//! What is kept of the steps of episodes.
+//! Recorders, which keep data of the steps of episodes.
 
 use indexmap::IndexMap;
 
@@ -9,8 +9,8 @@ use crate::trial::Trial;
 
 /// Sees every step of a number of episodes, numbered from 0.
 pub(crate) trait Recorder {
-    /// Environment step `step` of an episode was simulated, and its lights have
-    /// not moved yet. `fitness`: of the step; none if it does not count.
+    /// Called after environment step `step` of an episode, before its lights move. `fitness`: of
+    /// the step; `None` if it does not count.
     fn step(
         &mut self,
         episode: usize,
@@ -20,14 +20,14 @@ pub(crate) trait Recorder {
         fitness: Option<f64>,
     ) -> Result<(), EvaluateError>;
 
-    /// The last step of an episode was simulated. Episodes end in their order.
+    /// Called after the last step of an episode. Episodes end in order.
     fn end(&mut self, episode: usize, trial: &Trial<'_>);
 }
 
-/// Keeps nothing but the fitness of each episode.
+/// Keeps only the fitness of each episode.
 #[derive(Debug, Default)]
 pub(crate) struct FitnessOnly {
-    /// Per episode.
+    /// Fitness per episode.
     pub fitness: Vec<f64>,
 }
 
@@ -48,12 +48,12 @@ impl Recorder for FitnessOnly {
     }
 }
 
-/// Keeps the fitness of each episode and, step by step, all measures, NaN where
-/// there is none.
+/// Keeps the fitness of each episode and, step by step, all measures; NaN where a measure has no
+/// value.
 #[derive(Debug)]
 pub(crate) struct AllMeasures<'a> {
     names: &'a [MeasureName],
-    /// Of the latest step.
+    /// Measures of the latest step.
     measures: Measures,
     /// Numbers per episode.
     n_values: usize,
@@ -62,7 +62,7 @@ pub(crate) struct AllMeasures<'a> {
 }
 
 impl<'a> AllMeasures<'a> {
-    /// Of so many episodes.
+    /// A recorder for this many episodes.
     pub fn new(simulation: &'a Simulation, n_episodes: usize) -> Self {
         let n_values = simulation.values_per_trial();
         let values = vec![f64::NAN; n_episodes * n_values];
@@ -95,20 +95,20 @@ impl Recorder for AllMeasures<'_> {
 /// Shows every step of one episode to a function.
 pub(crate) struct Viewer<'a> {
     observe: &'a mut dyn FnMut(&StepRecord),
-    /// The latest step. Filled again in each, since its lists are as long in all of them.
+    /// The latest step. Every step refills it, because its lists keep their lengths.
     record: StepRecord,
-    /// Per measure its sum, and over how many steps.
+    /// The sum of each measure, and the number of its steps.
     sums: IndexMap<MeasureName, (f64, u32)>,
     fitness: f64,
 }
 
 impl<'a> Viewer<'a> {
-    /// Before the first step.
+    /// A viewer before the first step.
     pub fn new(observe: &'a mut dyn FnMut(&StepRecord)) -> Self {
         Self { observe, record: StepRecord::default(), sums: IndexMap::new(), fitness: 0.0 }
     }
 
-    /// The whole episode.
+    /// The summary of the whole episode.
     pub fn summary(self) -> EpisodeSummary {
         let means = self.sums.into_iter().map(|(name, (sum, n))| (name, sum / f64::from(n)));
         EpisodeSummary { fitness: self.fitness, measures: means.collect() }

@@ -168,7 +168,7 @@ fn messages_are_symbols_and_frames_obey_the_protocol() {
                 assert!((1..10).contains(&received.hops));
                 assert!(received.sector < 4 && received.signal > 0.0);
                 n_relayed += usize::from(received.hops > 1);
-                // It was sent so many steps ago.
+                // It was sent this many steps ago.
                 let sent = &steps[k - received.hops as usize].robots[received.originator];
                 assert_eq!(sent.mode, Mode::Send);
                 let heard = sent.message.iter().map(|&level| f64::from(level as f32));
@@ -330,8 +330,8 @@ fn ground_and_neighbours_reach_the_network() {
     }
 }
 
-/// Experiment D with a still light and a second object of robots that follow it
-/// without a network, and transmit.
+/// Experiment D with a resting light, and a second group of robots that follow the light without
+/// a network and transmit.
 fn with_followers() -> ExperimentConfig {
     let mut config = experiment_d();
     let mut followers = robot(&mut config).clone();
@@ -429,8 +429,8 @@ fn robots_may_be_mute_deaf_or_both() {
     }
 }
 
-/// Any change of these bits by the same files is a change of the format of a run:
-/// raise the number in `FINGERPRINT` and say in the commit why they changed.
+/// If the bits of the same files change, the format of runs has changed: raise the number in
+/// `FINGERPRINT`, and state the reason in the commit.
 #[test]
 fn fitness_bits_are_fixed_on_every_instruction_set() {
     for isa in Isa::available() {

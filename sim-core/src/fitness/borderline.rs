@@ -15,12 +15,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[Definition {
     },
 }];
 
-/// f = TPR * TNR; just TPR if no robot is in the interior.
+/// f = TPR * TNR; only TPR if no robot is in the interior.
 #[derive(Debug)]
 pub(super) struct IdentifyBorderline {
     range: f64,
     alpha: f64,
-    /// Who is at the border.
+    /// Whether each robot is at the border.
     targets: Vec<bool>,
 }
 
@@ -55,14 +55,14 @@ impl Fitness for IdentifyBorderline {
     }
 }
 
-/// Shares of robots that know their place.
+/// Shares of robots with the right LED.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Rates {
     /// Share of border robots with the LED on.
     true_positive: f64,
     /// Share of interior robots with the LED off; 1 without any.
     true_negative: f64,
-    /// Share of robots with the LED on that are at the border; none if no LED is on.
+    /// Share of robots with the LED on that are at the border; `None` if no LED is on.
     precision: Option<f64>,
     /// Share of all robots that are right.
     accuracy: f64,
@@ -71,7 +71,7 @@ struct Rates {
 impl Rates {
     /// Compares LEDs with the robots' places.
     fn new(at_border: &[bool], leds: &[u32]) -> Self {
-        // Robots at the place whose LED says so, and all robots at the place.
+        // Number of robots at the place with the right LED, and of all robots at the place.
         let count = |place: bool| {
             let robots = at_border.iter().zip(leds).filter(|(at_border, _)| **at_border == place);
             let right = robots.clone().filter(|(_, led)| (**led > 0) == place).count();
@@ -155,8 +155,8 @@ mod tests {
     }
 
     proptest! {
-        /// Accuracy is the mean of the rates, weighted with who is where, and what
-        /// is counted right among the LEDs that are on is so among the border, too.
+        /// Accuracy is the mean of both rates, weighted with the numbers of robots at each place.
+        /// The right LEDs among those that are on are the same robots as those among the border.
         #[test]
         fn rates_agree_with_each_other(robots in prop::collection::vec((any::<bool>(), 0..3_u32), 1..40)) {
             let (at_border, leds): (Vec<bool>, Vec<u32>) = robots.into_iter().unzip();

@@ -4,9 +4,9 @@ use super::{Definition, Fitness, Moment, mean};
 use crate::record::Measures;
 use experiment_file::FitnessFunction;
 
-/// Distance to the centroid at which a robot earns nothing, cm.
+/// Distance to the centroid from which on a robot contributes 0, cm.
 const FAR: f64 = 100.0;
-/// Robots that are not farther apart than this spoil the step, cm.
+/// Distance between two robots up to which the step has fitness 0, cm.
 const CROWDED: f64 = 20.0;
 
 /// The function of this file.

@@ -17,8 +17,8 @@ pub(super) const DEFINITIONS: &[Definition] = &[Definition {
     start: |_, _| Box::new(IdentifyLeader::default()),
 }];
 
-/// f = min(0.1 c, 5) with exactly one leader, c the number of steps before this
-/// one in which it has been sole leader without interruption; else 0.
+/// f = min(0.1 c, 5) with exactly one leader, otherwise 0. c is the number of directly preceding
+/// steps in which the same robot was the sole leader.
 #[derive(Debug, Default)]
 pub(super) struct IdentifyLeader {
     leadership: Leadership,

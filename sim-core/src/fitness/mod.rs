@@ -1,8 +1,7 @@
-//! How well a swarm does its task (chapter 5 of the thesis).
+//! Fitness functions of swarms (chapter 5 of the thesis).
 //!
-//! A fitness function is a row in `experiment-file`'s `fitness`, which says what it
-//! is called and what it needs, and a [`Definition`] beside its code, here. Each
-//! file has the functions of one subject.
+//! A fitness function is a row in `experiment-file`'s `fitness`, with its name and requirements,
+//! and a [`Definition`] beside its code here. Each file has the functions of one subject.
 
 mod borderline;
 mod grouping;
@@ -16,8 +15,8 @@ use crate::torus::{Torus, Vec2};
 use crate::world::World;
 use experiment_file::{FitnessFunction, FitnessParams};
 
-/// What a fitness function sees of a step: the robots that are evaluated, as
-/// they acted and after they moved, and the lights before they move.
+/// The view of a fitness function on a step: the evaluated robots, with their actions and after
+/// their motion, and the lights before their motion.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moment<'a> {
     /// The plane.
@@ -34,7 +33,7 @@ pub(crate) struct Moment<'a> {
     pub wheels: &'a [[f64; 2]],
     /// Colours of the robots' LEDs.
     pub leds: &'a [u32],
-    /// Which of the robots see light.
+    /// Whether each robot sees light.
     pub photosensitive: &'a [bool],
     /// Positions of the lights.
     pub lights: &'a [Vec2],
@@ -61,31 +60,31 @@ impl<'a> Moment<'a> {
 /// A fitness function in one trial. The trial's fitness is the mean over the
 /// steps that count.
 pub(crate) trait Fitness {
-    /// Fitness of a step; none if it does not count.
+    /// Fitness of a step; `None` if it does not count.
     fn step(&mut self, moment: &Moment<'_>) -> Option<f64>;
 
-    /// Adds the measures of the step that was scored last.
+    /// Adds the measures of the last scored step.
     fn measure(&self, moment: &Moment<'_>, measures: &mut Measures);
 
-    /// For each robot whether its LED should have been on in the step that was scored
-    /// last; empty if the task does not say.
+    /// Whether each robot's LED should have been on in the last scored step; empty if the task
+    /// does not define it.
     fn targets(&self) -> &[bool] {
         &[]
     }
 }
 
-/// A fitness function as far as it is the same for all trials.
+/// The part of a fitness function that all trials share.
 #[derive(Debug)]
 pub(crate) struct Definition {
     /// Its name in experiment files.
     pub function: FitnessFunction,
-    /// All measures that it may give, in their order.
+    /// Names of all its measures, in order.
     pub measures: &'static [&'static str],
-    /// Itself at the start of a trial.
+    /// Creates the function at the start of a trial.
     pub start: fn(&World, &FitnessParams) -> Box<dyn Fitness>,
 }
 
-/// The definition of a fitness function; none of the script's.
+/// The definition of a fitness function; `None` for the script's.
 pub(crate) fn definition(function: FitnessFunction) -> Option<&'static Definition> {
     [
         leader::DEFINITIONS,
@@ -109,7 +108,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 #[cfg(test)]
 use std::borrow::Cow;
 
-/// What a step is measured as.
+/// The measures of a step.
 #[cfg(test)]
 fn measures(fitness: &mut dyn Fitness, moment: &Moment<'_>) -> Vec<(&'static str, f64)> {
     let mut measures = Measures::new();
@@ -132,7 +131,7 @@ fn every_fitness_function_is_defined() {
 
 #[cfg(test)]
 impl Moment<'static> {
-    /// No robots, in a world of 1000 x 1000 cm.
+    /// A moment without robots, in a world of 1000 x 1000 cm.
     pub const EMPTY: Self = Self {
         torus: &Torus { width: 1000.0, height: 1000.0 },
         step: 0,

@@ -45,7 +45,7 @@ fn measure(moment: &Moment<'_>, measures: &mut Measures) {
     measures.insert("turning".into(), turning(moment.wheels));
 }
 
-/// Mean |right wheel|: robots whose only output turns them.
+/// Mean |right wheel|, for robots that only turn in place.
 fn turning(wheels: &[[f64; 2]]) -> f64 {
     mean(wheels.iter().map(|[right, _]| right.abs()))
 }
@@ -81,13 +81,13 @@ impl Fitness for Alignment {
     }
 }
 
-/// The largest difference of two headings, as far as it is below `MAX_SPREAD`;
-/// else something that is not.
+/// The largest difference of two headings if it is below `MAX_SPREAD`, otherwise any larger
+/// number.
 fn spread(headings: &[f64]) -> f64 {
     let Some(&first) = headings.first() else { return 0.0 };
     let (mut least, mut most) = (0.0, 0.0);
     for &heading in headings {
-        // On the short way around, in [-pi, pi].
+        // The shortest difference, in [-pi, pi].
         let turn = wrap_angle(heading - first + PI) - PI;
         if turn.abs() >= MAX_SPREAD {
             return MAX_SPREAD;
@@ -95,7 +95,7 @@ fn spread(headings: &[f64]) -> f64 {
         least = f64::min(least, turn);
         most = f64::max(most, turn);
     }
-    // All within a right angle or so of the first one: the circle does not matter.
+    // If all headings are near the first one, no difference wraps around the circle.
     most - least
 }
 

@@ -1,4 +1,4 @@
-//! What of a network the genotype covers, and the values of the rest.
+//! The parameters of a network that the genotype covers, and the values of the others.
 
 use indexmap::IndexMap;
 
@@ -13,11 +13,11 @@ const DECODERS: u64 = 1 << 32;
 
 /// The stream of delays, after those of the connections of groups.
 const DELAYS: u64 = 1 << 32;
-/// Substeps that a delay may have.
+/// Number of possible delays.
 const N_DELAYS: usize = (*limits::DELAYS.end() - *limits::DELAYS.start()) as usize + 1;
 
-/// Values of what the genotype does not cover. Weights of a decoder and delays are all drawn, so that
-/// none depends on what else is covered.
+/// Default values of all parameters. All weights of a decoder and all delays are drawn, so that
+/// no value depends on which others are covered.
 pub(super) fn defaults(
     config: &TopologyConfig,
     network: &Network,
@@ -71,7 +71,7 @@ pub(super) fn defaults(
     Phenotype { weights, neurons, delays, encoders, learning, decoders }
 }
 
-/// Which values the genotype covers.
+/// Whether the genotype covers each parameter.
 pub(super) struct ParameterCoverage {
     /// By number of the synapse.
     weights: Vec<bool>,
@@ -103,7 +103,7 @@ impl ParameterCoverage {
         }
     }
 
-    /// Whether a value is covered.
+    /// The flag of a parameter.
     pub fn flag_mut(&mut self, parameter: Parameter) -> &mut bool {
         match parameter {
             Parameter::Weight(synapse) => &mut self.weights[synapse],
@@ -115,8 +115,8 @@ impl ParameterCoverage {
         }
     }
 
-    /// What is not covered, except what the experiment declares untrainable, and parameters that
-    /// it evolves in no neuron, which is a choice.
+    /// Describes the parameters that are not covered. Omits those that the experiment declares
+    /// untrainable, and those that it evolves in no neuron, which is a choice.
     pub fn describe(&self, config: &TopologyConfig, network: &Network) -> Vec<String> {
         let mut lines = Vec::new();
         for (name, group) in network.groups.iter().filter(|(_, group)| group.trainable) {

@@ -1,4 +1,4 @@
-//! What queries of the genotype name.
+//! Resolves queries of the genotype.
 
 use std::ops::Range;
 
@@ -81,7 +81,7 @@ fn neurons_of(selector: &EnsembleSelector, network: &Network) -> Range<usize> {
     }
 }
 
-/// What has axons with a delay: neurons, and after them nodes of encoders.
+/// Axons with a delay: those of neurons, and then of nodes of encoders.
 fn axons_of(selector: &EnsembleSelector, network: &Network) -> Range<usize> {
     let n_neurons = network.n_neurons();
     match selector {
@@ -96,8 +96,8 @@ fn axons_of(selector: &EnsembleSelector, network: &Network) -> Range<usize> {
     }
 }
 
-/// A name is that of a group of synapses, a stimulus or an ensemble; the reader of
-/// experiment files sees to it that it is not several of them.
+/// Synapses by name: of a group, a stimulus or an ensemble. The reader of experiment files
+/// refuses ambiguous names.
 fn select_weights(selector: &SynapseSelector, network: &Network) -> Vec<Parameter> {
     let is_motor = |neuron: &usize| {
         let mut ensembles = network.ensembles.values();

@@ -1,4 +1,4 @@
-//! Where objects of the world start.
+//! Initialisers, which draw the start positions and headings of objects.
 
 mod random_graph;
 
@@ -18,7 +18,7 @@ pub(crate) struct Unplaceable {
 /// Start positions of `n` objects.
 #[derive(Debug, Clone)]
 pub(crate) enum Positions {
-    /// Given.
+    /// Given values.
     Fixed(Vec<Vec2>),
     /// Both coordinates uniform in \[low, high).
     Uniform { low: f64, high: f64, n: usize },
@@ -29,7 +29,7 @@ pub(crate) enum Positions {
 }
 
 impl Positions {
-    /// From the configuration, for `n` objects; or what is wrong with it.
+    /// Compiles the configuration for `n` objects; or returns its mistake.
     pub fn new(config: &Initializer, n: usize) -> Result<Self, String> {
         Ok(match config {
             Initializer::Fixed { values } => {
@@ -80,14 +80,14 @@ impl Positions {
 /// Start headings of `n` robots.
 #[derive(Debug, Clone)]
 pub(crate) enum Headings {
-    /// Given.
+    /// Given values.
     Fixed(Vec<f64>),
     /// Uniform in \[low, high).
     Uniform { low: f64, high: f64, n: usize },
 }
 
 impl Headings {
-    /// From the configuration, for `n` robots; or what is wrong with it.
+    /// Compiles the configuration for `n` robots; or returns its mistake.
     pub fn new(config: &Initializer, n: usize) -> Result<Self, String> {
         Ok(match config {
             Initializer::Fixed { values } => {

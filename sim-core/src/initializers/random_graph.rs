@@ -1,5 +1,5 @@
-//! `random_graph`: a connected, compact random geometric graph, grown one robot
-//! at a time. Steps turn tangential away from the centre and are drawn back to it.
+//! `random_graph`: a connected, compact random geometric graph, grown one robot at a time. Far
+//! from the centre, steps turn tangential and are pulled back.
 
 use super::Unplaceable;
 use crate::torus::{Torus, Vec2};
@@ -11,7 +11,7 @@ const STEP: f64 = 80.0;
 const MIN_DISTANCE: f64 = 40.0;
 /// Largest distance to the nearest robot, cm.
 const MAX_DISTANCE: f64 = 99.0;
-/// Candidates per robot before giving up.
+/// Most candidates per robot.
 const MAX_ATTEMPTS: usize = 10_000;
 
 /// Places `n` robots, the first at `initial`, which is also the centre.
@@ -51,7 +51,7 @@ struct Step {
 }
 
 impl Step {
-    /// `d`: way from the centre to the last robot, in units of `max_rad`.
+    /// `d`: displacement from the centre to the last robot, in units of `max_rad`.
     fn new(d: Vec2) -> Self {
         let angle = libm::atan2(d.y, d.x);
         let (sin, cos) = libm::sincos(angle);
@@ -79,7 +79,7 @@ impl Step {
     }
 }
 
-/// Far enough from every robot, and near enough to one.
+/// Whether a candidate is far enough from every robot, and near enough to one.
 fn stands(candidate: Vec2, placed: &[Vec2], torus: &Torus) -> bool {
     let distances = placed.iter().map(|&robot| torus.distance(robot, candidate));
     let nearest = distances.fold(f64::INFINITY, f64::min);

@@ -1,4 +1,4 @@
-//! Which synapses exist: drawn once per experiment from `topology.seed`.
+//! Draws the synapses of a network, once per experiment, from `topology.seed`.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::problems::Problems;
 use determinism::random::{Purpose, Stream};
 use experiment_file::{Neurotransmitter, TopologyConfig};
 
-/// Where a synapse comes from.
+/// The presynaptic side of a synapse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Source {
     /// Row of an input.
@@ -38,13 +38,12 @@ pub(crate) struct SynapseGroup {
     pub trainable: bool,
     /// Whether its weights change while robots live.
     pub is_plastic: bool,
-    /// What its spikes release; none of static synapses.
+    /// The neurotransmitter of its spikes; `None` for static synapses.
     pub transmitter: Option<Neurotransmitter>,
 }
 
-/// Draws the synapses of all groups, in the order that numbers them: group, name
-/// of the presynaptic side, name of the postsynaptic side, postsynaptic neuron,
-/// presynaptic neuron.
+/// Draws the synapses of all groups in the order of their numbers: by group, name of the
+/// presynaptic side, name of the postsynaptic side, postsynaptic neuron, presynaptic neuron.
 pub(super) fn draw(
     config: &TopologyConfig,
     stimuli: &IndexMap<String, Stimulus>,

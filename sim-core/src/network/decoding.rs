@@ -1,4 +1,4 @@
-//! From activities of motor neurons to actions.
+//! Decodes activities of motor neurons to actions.
 
 use std::ops::Range;
 
@@ -16,17 +16,17 @@ use experiment_file::{ActuatorQuery, DecodingConfig, TopologyConfig};
 /// An ensemble that drives an actuator.
 #[derive(Debug, Clone)]
 pub(crate) struct Output {
-    /// What it drives.
+    /// The actuator.
     pub actuator: ActuatorQuery,
     /// The motor neurons.
     pub neurons: Range<usize>,
-    /// How.
+    /// The decoder.
     pub decoder: Decoder,
     /// Number of weights of the decoder.
     pub n_weights: usize,
 }
 
-/// How activities or spikes become an action.
+/// A decoder of activities or spikes to an action.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Decoder {
     /// The activity itself.
@@ -86,8 +86,7 @@ pub(super) fn compile(
 }
 
 impl Output {
-    /// Decodes what the neurons of one lane show. `weights`: those of the decoder, value
-    /// by value.
+    /// Decodes the neurons of one lane. `weights`: of the decoder, value by value.
     pub fn decode(
         &self,
         state: &NetworkState,
@@ -106,7 +105,7 @@ impl Output {
         }
     }
 
-    /// The values that the spikes of one lane stand for.
+    /// Decodes the spikes of one lane to values.
     fn decode_spikes(
         &self,
         window: &SpikeWindow,
@@ -139,7 +138,7 @@ impl Output {
                     values.push(1.0 / (1.0 + libm::exp(-3.0 * sum)) + rest_value - 0.5);
                 }
             }
-            // The reader sees to it that decoders of activities have rate neurons.
+            // The reader guarantees that decoders of activities have rate neurons.
             _ => {
                 let earliest = self.neurons.clone().min_by(|&a, &b| first(a).total_cmp(&first(b)));
                 values.push(earliest.map_or(0.0, |neuron| (neuron - self.neurons.start) as f64));
@@ -147,7 +146,7 @@ impl Output {
         }
     }
 
-    /// Numbers become an action.
+    /// Sets an action from numbers.
     fn apply(&self, values: &[f64], action: &mut Action<'_>) {
         let value = values.first().copied().unwrap_or_default();
         let category = if self.decoder == Decoder::FirstToSpike {
@@ -228,7 +227,7 @@ impl Output {
 }
 
 impl Decoder {
-    /// The value that one activity stands for; a category is not one's own.
+    /// The value of one activity; not for categories, which depend on all activities.
     fn value(self, activity: f64, stream: &mut Stream) -> f64 {
         match self {
             Self::Threshold => f64::from(activity >= 0.5),

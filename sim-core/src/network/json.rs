@@ -1,4 +1,4 @@
-//! A network with its values, for people and other programs to read.
+//! Writes a network with its values as JSON, for people and other programs.
 
 use serde_json::{Map, Value, json};
 

@@ -1,4 +1,4 @@
-//! The neural network's structure: what is the same for all genotypes.
+//! The structure of the neural network, which all genotypes share.
 
 pub(crate) mod connections;
 pub(crate) mod decoding;
@@ -34,11 +34,11 @@ pub(crate) struct Network {
     pub bias_in_gain: bool,
     /// Activities before the first substep.
     pub initial_rates: InitialRates,
-    /// Time constant of motor neurons, seconds; none: as for all neurons.
+    /// Time constant of motor neurons, seconds; `None`: as for all neurons.
     pub motor_tau: Option<f64>,
-    /// Receptors of dynamic synapses; none of static ones.
+    /// Receptors of dynamic synapses; `None` for static ones.
     pub receptors: Option<SynapseParams>,
-    /// How weights change while robots live; none: they do not.
+    /// The plasticity of weights; `None`: weights are constant.
     pub learning: Option<LearningConfig>,
     /// Inputs by name, in the order of their rows.
     pub stimuli: IndexMap<String, Stimulus>,
@@ -48,10 +48,10 @@ pub(crate) struct Network {
     pub groups: IndexMap<String, SynapseGroup>,
     /// All synapses, group by group.
     pub synapses: Vec<Synapse>,
-    /// The order in which they are computed, once it is asked for: whoever merely checks
-    /// experiments, as a coordinator does, needs none, and it may have a million synapses.
+    /// The order of computation, made on first use: programs that only check experiments do not
+    /// need it, and it may have a million synapses.
     wiring: OnceLock<Wiring>,
-    /// What neurons do, in the order of the configuration.
+    /// Outputs, in the order of the configuration.
     pub outputs: Vec<Output>,
 }
 
@@ -62,16 +62,16 @@ pub(crate) struct Stimulus {
     pub inputs: Range<usize>,
     /// The reading that it carries.
     pub sensor: SensorQuery,
-    /// What makes spikes of it; none: it acts as it is.
+    /// Its encoder; `None`: it acts without one.
     pub encoder: Option<Encoder>,
 }
 
-/// How a stimulus becomes spikes.
+/// An encoder, which turns a stimulus into spikes.
 #[derive(Debug, Clone)]
 pub(crate) struct Encoder {
     /// Its nodes among those of all encoders.
     pub nodes: Range<usize>,
-    /// How values become spikes.
+    /// Its configuration.
     pub config: EncodingConfig,
     /// Number of weights of its receptive field.
     pub n_weights: usize,
@@ -82,7 +82,7 @@ pub(crate) struct Encoder {
 pub(crate) struct Ensemble {
     /// Its neurons.
     pub neurons: Range<usize>,
-    /// Activation function F; none if the neuron model has none.
+    /// Activation function F; `None` if the neuron model has none.
     pub activation: Option<Activation>,
     /// Values of the model's parameters that the genotype does not cover, by name.
     pub defaults: NamedMap<f64>,
@@ -98,7 +98,7 @@ impl Ensemble {
 }
 
 impl Network {
-    /// Draws the connections; notes names that nothing has.
+    /// Compiles the network, and draws its connections; notes unknown names.
     pub fn compile(config: &TopologyConfig, problems: &mut Problems) -> Self {
         let (mut n_inputs, mut n_encoded) = (0, 0);
         let stimuli = config.stimuli.iter().map(|(name, stimulus)| {
@@ -155,7 +155,7 @@ impl Network {
         self.wiring.get_or_init(new)
     }
 
-    /// Axonal delays: one per neuron and node of an encoder, with dynamic synapses.
+    /// Number of axonal delays: with dynamic synapses, one per neuron and node of an encoder.
     pub fn n_delays(&self) -> usize {
         if self.receptors.is_some() { self.n_neurons() + self.n_encoded() } else { 0 }
     }
@@ -166,12 +166,12 @@ impl Network {
         stimuli.filter_map(|stimulus| Some((stimulus.inputs.clone(), stimulus.encoder.as_ref()?)))
     }
 
-    /// Nodes of all encoders.
+    /// Number of nodes of all encoders.
     pub fn n_encoded(&self) -> usize {
         self.encoders().last().map_or(0, |(_, encoder)| encoder.nodes.end)
     }
 
-    /// Nodes that draw a random number in every substep.
+    /// Number of nodes that draw a random number in every substep.
     pub fn n_drawing(&self) -> usize {
         let poisson = |encoder: &&Encoder| encoder.config.scheme == EncodingScheme::PoissonRate;
         let drawing = self.encoders().map(|(_, encoder)| encoder).filter(poisson);

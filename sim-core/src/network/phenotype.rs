@@ -1,16 +1,14 @@
-//! The values of a network that a genotype decides.
+//! The phenotype: all values of a network's parameters.
 
 use indexmap::IndexMap;
 
-/// One value per synapse, one per neuron and parameter of the neuron model, one per node and
-/// value of the receptive fields that have weights, and one per neuron and value of such
-/// decodings.
+/// One value per synapse, one per neuron and parameter of the neuron model, and one per weight of
+/// receptive fields and decodings.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Phenotype {
     /// Weights, by number of the synapse.
     pub weights: Vec<f64>,
-    /// By name of the parameter, in the order of the neuron model's parameters: its
-    /// values, by number of the neuron.
+    /// Values by number of the neuron, for each parameter of the neuron model, in its order.
     pub neurons: IndexMap<&'static str, Vec<f64>>,
     /// By number of the neuron, and then of the node of an encoder: the delay of its dynamic
     /// synapses, whole substeps within

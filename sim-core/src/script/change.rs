@@ -1,4 +1,4 @@
-//! What a script may change, and when.
+//! The changes that a script may make in each of its functions.
 
 use determinism::random::Stream;
 use task_script::{Object, Value};
@@ -12,22 +12,22 @@ use crate::world::RobotGroup;
 /// Largest number of a colour.
 const COLORS: i64 = 255;
 
-/// What a call may change beside `state`.
+/// The changes that a call may make besides `state`.
 pub(crate) enum May<'a> {
-    /// Nothing.
+    /// None.
     Look,
-    /// Nothing: what the robot senses is what the function returns.
+    /// None: the function returns the robot's reading.
     Sense { robot: usize, stream: &'a mut Stream },
-    /// What one robot does in this step.
+    /// The actions of one robot in this step.
     Act { robot: usize, plan: &'a mut Plan, stream: &'a mut Stream },
-    /// Nothing: where the light or area goes is what the function returns.
+    /// None: the function returns the new place of the light or area.
     Move { thing: Object, stream: &'a mut Stream },
-    /// Which robots fail and carry something, which lights and areas are on.
+    /// Whether robots fail and carry something, and whether lights and areas are on.
     React,
 }
 
 impl May<'_> {
-    /// What the function says if something else is to be changed.
+    /// The advice in the error for any other change.
     fn advice(&self) -> &'static str {
         match self {
             Self::Look => "what is to be remembered goes into `state`, a dict",
@@ -45,7 +45,7 @@ impl May<'_> {
     }
 }
 
-/// What a robot is going to do in a step.
+/// A robot's planned actions in a step.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     wheels: [f64; 2],
@@ -60,13 +60,13 @@ impl Plan {
         Self { wheels: [0.0; 2], led: 0, mode: Mode::Send, message: vec![0.0; message_len] }
     }
 
-    /// Forgets what was planned.
+    /// Resets the plan.
     pub fn reset(&mut self) {
         *self = Self { message: std::mem::take(&mut self.message), ..Self::new(0) };
         self.message.fill(0.0);
     }
 
-    /// Has the robot do it.
+    /// Sets the robot's actions.
     pub fn carry_out(&self, action: &mut Action<'_>) {
         *action.wheels = self.wheels;
         *action.led = self.led;
@@ -113,7 +113,7 @@ impl Plan {
 
 type Change = Result<(), String>;
 
-/// A number of a range that ends at 1.
+/// A number in [`least`, 1].
 fn within(least: f64, value: f64, what: &str) -> Result<f64, String> {
     if (least..=1.0).contains(&value) {
         Ok(value)

@@ -1,6 +1,6 @@
 //! The task that an experiment brings as a script: compiled once, executed in every trial.
-//! `names` is what scripts can name, `view` what they see, `change` what they change, `sensing`
-//! what robots sense by them.
+//! `names` has the names for scripts, `view` reads the world for them, `change` makes their
+//! changes, and `sensing` computes their readings.
 
 mod change;
 mod names;
@@ -23,39 +23,39 @@ use crate::world::{RobotGroup, World};
 use sensing::Sensing;
 use view::{Kept, Kind};
 
-/// Largest absolute value that a function may return: sums and squares of it are finite.
+/// Largest absolute value that a function may return, so that sums and squares are finite.
 const LARGEST: f64 = 1e100;
-/// Work of a call, in statements: less than a second, whatever the script does.
+/// Limit of work per call, in statements: less than a second for any script.
 const WORK: u64 = 3_000_000;
-/// Memory that a trial may keep, bytes, beside [`MEMORY_PER_ROBOT`].
+/// Limit of memory per trial, bytes, in addition to [`MEMORY_PER_ROBOT`].
 const MEMORY: usize = 256 << 10;
 const MEMORY_PER_ROBOT: usize = 4 << 10;
 
-/// The functions that a script may have, with their arguments; beside `sense`, which is one where
-/// robots have the sensor.
+/// The functions of a script, with their numbers of arguments; also `sense` if robots have the
+/// sensor.
 const FUNCTIONS: [(&str, usize); 6] =
     [("fitness", 1), ("final", 1), ("measures", 1), ("control", 1), ("move", 1), ("react", 1)];
 
-/// A script as far as it is the same for all trials.
+/// The part of a script that all trials share.
 #[derive(Debug)]
 pub(crate) struct ScriptTask {
     program: Program,
     fitness: Option<FunctionId>,
-    /// Fitness of the whole episode.
+    /// The function for the fitness of the whole episode.
     last: Option<FunctionId>,
     measures: Option<FunctionId>,
-    /// What a robot does.
+    /// The function for the actions of a robot.
     control: Option<FunctionId>,
-    /// Where a light or ground area goes.
+    /// The function for the motion of a light or ground area.
     move_: Option<FunctionId>,
-    /// What happens to robots, lights and areas.
+    /// The function for events of robots, lights and areas.
     react: Option<FunctionId>,
-    /// The names that `measures` gives.
+    /// The names of the measures.
     measure_names: Vec<MeasureName>,
 }
 
 impl ScriptTask {
-    /// Compiles a script; none if something is wrong, which is reported.
+    /// Compiles a script; reports problems and returns `None` if there are any.
     pub fn compile(config: &ScriptConfig, problems: &mut Problems) -> Option<Self> {
         let program = match Program::compile(&config.name, &config.text, &names::VOCABULARY) {
             Ok(program) => program,
@@ -102,7 +102,7 @@ impl ScriptTask {
         })
     }
 
-    /// Reports what the world leaves to a script that has no function for it.
+    /// Reports objects that need a function that the script lacks.
     pub fn check(&self, file: &str, world: &World, problems: &mut Problems) {
         let mut needs = |function: Option<FunctionId>, name: &str, site: &Site| {
             if function.is_none() {
@@ -133,14 +133,14 @@ impl ScriptTask {
     }
 }
 
-/// The problem of a function that takes another number of arguments.
+/// The problem of a function with a wrong number of parameters.
 fn takes(program: &Program, function: FunctionId, n_arguments: usize) -> Option<ScriptError> {
     let (_, n_found) = program.signature(function);
     let message = || format!("takes {n_arguments} argument, not {n_found}");
     (n_found != n_arguments).then(|| program.problem(function, message()))
 }
 
-/// Where problems of scripts are reported.
+/// The path of problems of scripts.
 pub(crate) const PATH: &str = "task.script";
 
 /// A script in one trial.
@@ -149,11 +149,11 @@ pub(crate) struct ScriptRun<'a> {
     task: &'a ScriptTask,
     script: Script,
     kept: Kept,
-    /// Robots that it decides for, by their numbers.
+    /// Robots for which it decides, by their numbers.
     actors: Vec<Actor>,
-    /// Lights, then ground areas that it moves.
+    /// Lights, and then ground areas, that it moves.
     movers: Vec<Mover>,
-    /// Robots that it senses for, by their numbers.
+    /// Robots for which it computes readings, by their numbers.
     sensing: Vec<Sensing>,
 }
 
@@ -170,12 +170,12 @@ struct Actor {
 struct Mover {
     thing: Object,
     stream: Stream,
-    /// Where it goes.
+    /// Its new place.
     target: Option<Vec2>,
 }
 
 impl<'a> ScriptRun<'a> {
-    /// At the start of a trial; `stream` gives what the script draws from.
+    /// A script at the start of a trial; `stream` returns random streams.
     pub fn start(
         task: &'a ScriptTask,
         world: &World,
@@ -213,14 +213,14 @@ impl<'a> ScriptRun<'a> {
         })
     }
 
-    /// What the script has a robot do in this step; none if it does not decide for it.
+    /// The plan of a robot in this step; `None` if the script does not decide for it.
     pub fn plan(&self, robot: usize) -> Option<&Plan> {
         let found = self.actors.binary_search_by_key(&robot, |actor| actor.robot);
         found.ok().map(|place| &self.actors[place].plan)
     }
 
-    /// Decides what robots do in this step, all from what they did in the last one. The calls
-    /// share the work of one.
+    /// Decides the actions of robots in this step. All calls see the actions of the previous
+    /// step, and share the work of one call.
     pub fn control(&mut self, mut view: View<'_>) -> Result<(), ScriptError> {
         let Self { task, script, kept, actors, .. } = self;
         let Some(function) = task.control else { return Ok(()) };
@@ -246,8 +246,8 @@ impl<'a> ScriptRun<'a> {
         Ok(())
     }
 
-    /// Moves lights and ground areas, each from where all of them were. The calls share the
-    /// work of one.
+    /// Moves lights and ground areas. All calls see the places before the motion, and share the
+    /// work of one call.
     pub fn move_things(&mut self, mut view: View<'_>) -> Result<(), ScriptError> {
         let Self { task, script, kept, movers, .. } = self;
         let Some(function) = task.move_ else { return Ok(()) };
@@ -277,7 +277,7 @@ impl<'a> ScriptRun<'a> {
         Ok(())
     }
 
-    /// What happens to robots, lights and areas after they acted.
+    /// Lets the script react after the actions of robots.
     pub fn react(&mut self, mut view: View<'_>) -> Result<(), ScriptError> {
         let Some(function) = self.task.react else { return Ok(()) };
         let view = view.again(May::React);
@@ -303,7 +303,7 @@ impl<'a> ScriptRun<'a> {
         self.script.call(program, function, &[argument], &mut view)
     }
 
-    /// Fitness of a step; none if it does not count.
+    /// Fitness of a step; `None` if it does not count.
     pub fn fitness(&mut self, view: View<'_>) -> Result<Option<f64>, ScriptError> {
         let Some(function) = self.task.fitness else { return Ok(None) };
         match self.call(function, |_, _| Ok(view::WORLD), view)? {
@@ -312,7 +312,7 @@ impl<'a> ScriptRun<'a> {
         }
     }
 
-    /// Fitness of the whole episode; none if the script leaves it to the steps.
+    /// Fitness of the whole episode; `None` for the mean over the steps.
     pub fn last(&mut self, view: View<'_>) -> Result<Option<f64>, ScriptError> {
         let Some(function) = self.task.last else { return Ok(None) };
         let state = |view: &mut View<'_>, script: &Script| view.world_state(script.meter());
@@ -344,7 +344,7 @@ impl<'a> ScriptRun<'a> {
         Ok(())
     }
 
-    /// The number that a function has to return.
+    /// Checks the number that a function has returned.
     fn finite(&self, function: FunctionId, value: &Value) -> Result<f64, ScriptError> {
         let problem = |message| self.task.program.problem(function, message);
         match value.number() {
@@ -357,7 +357,7 @@ impl<'a> ScriptRun<'a> {
     }
 }
 
-/// An error, with what the script was called for.
+/// Adds the purpose of the call to an error.
 fn about(mut error: ScriptError, what: &str) -> ScriptError {
     error.message = format!("{}, for {what}", error.message);
     error

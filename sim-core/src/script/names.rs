@@ -1,8 +1,8 @@
-//! The names that scripts give to what they see and change.
+//! The names of attributes and methods in scripts.
 
 use task_script::Vocabulary;
 
-/// From a row per name: an enum and the vocabulary.
+/// Makes an enum and the vocabulary from one row per name.
 macro_rules! names {
     ($($name:literal = $variant:ident,)*) => {
         /// An attribute or a method.
@@ -66,7 +66,7 @@ impl Named {
         ALL[usize::from(name)]
     }
 
-    /// As scripts write it.
+    /// The name in scripts.
     pub fn name(self) -> &'static str {
         VOCABULARY.names[self as usize]
     }

@@ -1,4 +1,4 @@
-//! What robots sense by the script: its function `sense`.
+//! Readings of `script_sensor`, which the script's function `sense` computes.
 
 use determinism::random::{Purpose, Stream};
 use experiment_file::SensorQuery;
@@ -20,11 +20,11 @@ fn groups(world: &World) -> impl Iterator<Item = &RobotGroup> {
 pub(super) struct Sensing {
     robot: usize,
     stream: Stream,
-    /// What it senses in this step.
+    /// Its reading in this step.
     reading: Vec<f64>,
 }
 
-/// All robots that have a `script_sensor`; `stream` gives what they draw from.
+/// All robots that have a `script_sensor`; `stream` returns their random streams.
 pub(super) fn start(world: &World, stream: impl Fn(Purpose, usize) -> Stream) -> Vec<Sensing> {
     let n_values = |group: &RobotGroup| {
         let readings = group.readings.iter();
@@ -41,13 +41,14 @@ pub(super) fn start(world: &World, stream: impl Fn(Purpose, usize) -> Stream) ->
 }
 
 impl ScriptTask {
-    /// The function that says what robots sense. Where no robot has the sensor, a function of
-    /// its name is a helper of the script's.
+    /// The function `sense`. If no robot has the sensor, a function of this name is an ordinary
+    /// helper.
     pub(super) fn sense(&self) -> Option<FunctionId> {
         self.program.function("sense")
     }
 
-    /// Reports a `script_sensor` without a function for it, and a script that has nothing else.
+    /// Reports a `script_sensor` without the function `sense`, and a script that has only this
+    /// function while no robot has the sensor.
     pub(super) fn check_sensors(&self, file: &str, world: &World, problems: &mut Problems) {
         let mut sensing = groups(world).peekable();
         let Some(function) = self.sense() else {
@@ -74,8 +75,8 @@ impl ScriptTask {
 }
 
 impl ScriptRun<'_> {
-    /// Says what robots with a `script_sensor` sense in this step, all from what they sensed in
-    /// the last one. The calls share the work of one.
+    /// Computes the readings of robots with a `script_sensor` in this step. All calls see the
+    /// readings of the previous step, and share the work of one call.
     pub fn sense(&mut self, mut view: View<'_>) -> Result<(), ScriptError> {
         let Self { task, script, kept, sensing, .. } = self;
         let (false, Some(function)) = (sensing.is_empty(), task.sense()) else { return Ok(()) };
@@ -93,13 +94,13 @@ impl ScriptRun<'_> {
         Ok(())
     }
 
-    /// Robots with a `script_sensor`, each with what it senses in this step.
+    /// Robots with a `script_sensor`, each with its reading in this step.
     pub fn sensed(&self) -> impl Iterator<Item = (usize, &[f64])> {
         self.sensing.iter().map(|sensor| (sensor.robot, sensor.reading.as_slice()))
     }
 }
 
-/// Takes a reading from what the function returns.
+/// Reads a reading from the result of the function.
 fn take(value: &Value, reading: &mut [f64]) -> Result<(), String> {
     let n = reading.len();
     let expected = || format!("a `script_sensor` with `n` {n} needs a list of {n} numbers");

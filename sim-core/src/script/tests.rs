@@ -1,4 +1,4 @@
-//! Scripts in episodes: the built-in tasks as scripts, to the same bits, and what goes wrong.
+//! Scripts in episodes: the built-in tasks as scripts, to the same bits, and failures.
 
 mod acting;
 mod sensing;
@@ -78,7 +78,7 @@ fn every_built_in_task_can_be_said_as_a_script_to_the_same_bits() {
     }
 }
 
-/// Why an episode of experiment A with this script ends.
+/// The failure of an episode of experiment A with this script.
 fn failure(text: &str) -> EvaluateError {
     let config = with_script(experiment_a(), "t.star", text);
     let simulation = Simulation::compile(&config).unwrap();
@@ -117,7 +117,7 @@ fn a_script_is_stopped_in_the_middle_of_a_step_and_has_no_result() {
     let stopped = simulation.evaluate_while(&genotype, 0, 0..1, &keep_going);
     assert_eq!(stopped, Ok(None));
     assert!(n_asked.get() < 25, "asked {} times", n_asked.get());
-    // Nobody stops what uses up its budget: that is the script's failure.
+    // A script that uses up its budget fails by itself, without being stopped.
     let failed = simulation.evaluate(&genotype, 0, 0..1).unwrap_err();
     assert!(failed.to_string().contains("does too much"), "{failed}");
 }

@@ -1,5 +1,5 @@
-//! What a script sees of a trial, and what it may change. Nothing is copied: a thing of
-//! the world is a kind and a number, and its attributes are read where the trial has them.
+//! The view of a script on a trial. It copies nothing: an object of the world is a kind and a
+//! number, and the view reads its attributes in place.
 
 use std::f64::consts::PI;
 use std::rc::Rc;
@@ -18,10 +18,10 @@ use crate::torus::{Vec2, wrap_angle};
 use crate::trial::Group;
 use crate::world::World;
 
-/// The only thing of its kind.
+/// The only object of its kind.
 pub(super) const WORLD: Value = Value::Object(Object { kind: Kind::World as u8, index: 0 });
 
-/// Kinds of things.
+/// Kinds of objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Kind {
@@ -51,13 +51,13 @@ impl Kind {
     }
 }
 
-/// What a script keeps from step to step.
+/// The data that a script keeps from step to step.
 #[derive(Debug)]
 pub(crate) struct Kept {
     stream: Stream,
-    /// Lists of things that are always the same.
+    /// Lists of objects that never change.
     lists: Vec<(Named, Value)>,
-    /// `state` of things.
+    /// `state` of objects.
     states: Vec<(Object, Value)>,
 }
 
@@ -74,14 +74,14 @@ pub(crate) struct View<'a> {
     pub lights: &'a mut [Vec2],
     pub areas: &'a mut [Vec2],
     pub switches: &'a mut Switches,
-    /// What robots sense, group by group.
+    /// Readings of robots, group by group.
     pub groups: &'a [Group],
     /// Environment step, from 0.
     pub step: u32,
     /// Steps of the episode.
     pub n_steps: u32,
     pub may: May<'a>,
-    /// Whether to go on.
+    /// Whether to continue.
     pub goes_on: &'a dyn Fn() -> bool,
     /// Set by the caller of the script.
     pub kept: Option<&'a mut Kept>,
@@ -90,7 +90,7 @@ pub(crate) struct View<'a> {
 type Answer = Result<Value, String>;
 
 impl<'a> View<'a> {
-    /// The same step for another call, which may change what `may` says.
+    /// The same step for another call, which may make the changes of `may`.
     pub fn again<'b>(&'b mut self, may: May<'b>) -> View<'b> {
         View {
             world: self.world,
@@ -130,7 +130,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// A list of things that is the same in all steps.
+    /// A list of objects that is the same in all steps.
     fn list(&mut self, name: Named, meter: &Rc<Meter>) -> Answer {
         let (kind, numbers) = match name {
             Named::Robots => (Kind::Robot, self.world.evaluated()),
@@ -158,7 +158,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// A thing's position, or the point `(x, y)`, in the torus.
+    /// The position of an object, or the point `(x, y)`, in the torus.
     pub(super) fn point(&self, value: &Value) -> Result<Vec2, String> {
         match value {
             Value::Object(object) => self.position(*object),
@@ -175,7 +175,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The lights or areas that a thing is one of.
+    /// The lights or areas to which an object belongs.
     fn objects(&self, object: Object) -> Result<&'a StaticObjects, String> {
         let groups = match Kind::of_object(object) {
             Kind::Light => &self.world.lights,
@@ -263,7 +263,7 @@ impl<'a> View<'a> {
         Value::list(values.into_iter().map(Value::Float).collect(), meter)
     }
 
-    /// The stream of the thing that the script decides for.
+    /// The random stream of the object for which the script decides.
     fn own_stream(&mut self, object: Object) -> Result<&mut Stream, String> {
         match &mut self.may {
             May::Act { robot, stream, .. } | May::Sense { robot, stream }
@@ -279,7 +279,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Robots within reach of a thing or point, but not the thing itself.
+    /// Robots within `range` of an object or point, except the object itself.
     fn neighbours(&self, of: &Value, range: f64, meter: &Rc<Meter>) -> Answer {
         meter.work(self.world.n_robots() / 4)?;
         let from = self.point(of)?;
@@ -318,7 +318,7 @@ impl<'a> View<'a> {
             (Named::Neighbours, [of, range]) => self.neighbours(of, number(range)?, meter)?,
             (Named::Border, []) => {
                 let evaluated = self.world.evaluated();
-                // Each robot has a part of its own, which is all that a small swarm costs.
+                // The work per robot, which is the whole cost for a small swarm.
                 let n = evaluated.len();
                 meter.work(n * n / 16 + 30 * n)?;
                 let positions = &self.swarm.positions[evaluated.clone()];
@@ -410,7 +410,7 @@ impl Host for View<'_> {
     }
 }
 
-/// What a script sees outside functions, and whether to go on.
+/// The host of statements outside functions; the function tells whether to continue.
 pub(super) struct Nothing<'a>(pub &'a dyn Fn() -> bool);
 
 impl Host for Nothing<'_> {
@@ -453,7 +453,7 @@ fn wrong_call(kind: Kind, name: Named, arguments: &[Value]) -> String {
     format!("{} has no `{}` of {} arguments", kind.name(), name.name(), arguments.len())
 }
 
-/// A name of the script's, fit for a message.
+/// A name from the script, fit for a message.
 fn shortened(name: &str) -> String {
     name.chars().take(40).map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

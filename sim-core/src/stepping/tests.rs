@@ -1,4 +1,4 @@
-//! Steps, of agents that are told what to do, that get something else, and that are silent.
+//! Steps with given actions, with replaced stimuli, and with silent agents.
 
 use super::*;
 use crate::testing::{experiment_a, experiment_a_spiking, genotype, robot};
@@ -8,8 +8,7 @@ use experiment_file::{
     StimuliInhibitionConfig, StimulusSelector,
 };
 
-/// Leader selection with LIF neurons that learn, of which one stimulus has spikes drawn at
-/// random.
+/// Leader selection with LIF neurons that learn; one stimulus has random spikes.
 fn experiment_a_plastic() -> ExperimentConfig {
     let mut config = experiment_a_spiking(NeuronModel::Lif);
     let receptive_field = ReceptiveField::Linear(LinearField { n_neurons: 3 });
@@ -141,7 +140,7 @@ fn a_silent_robot_is_not_heard_in_the_next_step_only() {
         let actions = stepper.decide(&mut policy);
         stepper.step(&actions).unwrap();
         assert!(stepper.sent().iter().all(|sent| *sent), "whatever networks want");
-        // So everybody who has a neighbour hears something, and everybody has one.
+        // So every robot with a neighbour hears a frame, and every robot has a neighbour.
         for (index, stimuli) in stepper.stimuli().chunks_exact(n_inputs).enumerate() {
             let hears = stimuli[direction.clone()].iter().any(|value| *value != 0.0);
             assert_eq!(hears, step != 4 || index >= n_agents, "{index}, after step {step}");

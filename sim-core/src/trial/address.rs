@@ -1,4 +1,4 @@
-//! Which trial it is, and what follows from that: its random numbers, and where things start.
+//! The address of a trial, which determines its random numbers and start positions.
 
 use determinism::random::{Purpose, Stream, TrialSet};
 use task_script::ScriptError;
@@ -7,7 +7,7 @@ use crate::objects::{Site, StaticObjects};
 use crate::simulation::EvaluateError;
 use crate::torus::{Torus, Vec2};
 
-/// Which trial it is.
+/// The address of a trial.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Address {
     pub seed: u64,
@@ -16,12 +16,12 @@ pub(super) struct Address {
 }
 
 impl Address {
-    /// The random numbers for a purpose of an object.
+    /// The random stream for a purpose of an object.
     pub fn stream(self, purpose: Purpose, number: usize) -> Stream {
         self.numbered_stream(purpose, number as u64)
     }
 
-    /// The same for more numbers than there are objects.
+    /// The same for stream numbers beyond those of objects.
     pub fn numbered_stream(self, purpose: Purpose, number: u64) -> Stream {
         Stream::new(self.seed, self.trial_set, self.trial.into(), purpose, number)
     }

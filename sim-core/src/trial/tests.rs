@@ -1,4 +1,4 @@
-//! The phases of a step: who hears whom, and what robots read and send.
+//! The phases of a step: hearing, readings and messages of robots.
 
 use super::*;
 use crate::communication::FrameOrigin;
@@ -6,7 +6,7 @@ use crate::testing::{experiment_a, robot};
 use experiment_file::{ExperimentConfig, Initializer, SendingDirection};
 use std::f64::consts::FRAC_PI_2;
 
-/// All of them send before this step.
+/// All robots send before this step.
 const SENDING_STEPS: u32 = 10;
 
 /// Robots with heading 0 in a line, 90 cm apart: each hears its neighbours.
@@ -22,7 +22,7 @@ fn line(n: u32) -> ExperimentConfig {
     config
 }
 
-/// Has robots' networks get the sending direction instead of the receiving one.
+/// Gives robots' networks the sending direction instead of the receiving one.
 fn observe_sending_direction(config: &mut ExperimentConfig) {
     let mut stimuli = config.topology.stimuli.values_mut();
     let direction = stimuli
@@ -31,7 +31,7 @@ fn observe_sending_direction(config: &mut ExperimentConfig) {
     direction.sensor = SensorQuery::ReceiverSendingDirection;
 }
 
-/// One step in which robots act as `modes` and `message` say.
+/// One step in which robots use these modes and this message.
 fn step(trial: &mut Trial<'_>, modes: &[Mode], message: [f64; 2]) {
     trial.sense(SENDING_STEPS).unwrap();
     trial.swarm.modes.copy_from_slice(modes);
@@ -177,8 +177,7 @@ fn the_chosen_frame_is_uniform_among_the_sectors_with_a_valid_one() {
     assert!((900..1100).contains(&from_right), "{from_right}");
     step(&mut trial, &[Mode::Send, Mode::Send, Mode::Relay], [0.0; 2]);
     for _ in 0..20 {
-        // Robot 2 relays what robot 1 sent: of its neighbours, robot 1 can
-        // accept robot 0's frames only.
+        // Robot 2 relays robot 1's message: robot 1 can accept only robot 0's frames.
         step(&mut trial, &[Mode::Send, Mode::Send, Mode::Relay], [0.0; 2]);
         assert_eq!(trial.swarm.received[1].unwrap().sector, 2);
     }

@@ -1,10 +1,11 @@
 //! Plasticity: weights that change while robots live, by a generalised Hebbian rule (Niv, Joel,
 //! Meilijson and Ruppin 2002, Adaptive Behavior 10, 5), with reward after a delay.
 //!
-//! Before every environment step but the first ones, w += rate R (A x_i x_j + B x_i + C x_j + D)
-//! of the synapses of plastic groups, cut to the largest weight. x_i and x_j are activities of
-//! the step before, and R = 1; or those of some steps ago, and R is the discounted sum of the
-//! rewards since. Every lane has its own weights.
+//! Before every environment step except the first ones, w += rate R (A x_i x_j + B x_i + C x_j +
+//! D) for the synapses of plastic groups, clipped to the largest weight. Without reward, x_i and
+//! x_j are activities of the previous step, and R = 1. With reward, they are activities of an
+//! earlier step, and R is the discounted sum of the rewards since then. Every lane has its own
+//! weights.
 
 use pulp::Simd;
 
@@ -13,16 +14,16 @@ use crate::lanes::Lanes;
 use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
 
-/// How the weights of a genotype change.
+/// The learning rule with the values of a genotype.
 #[derive(Debug)]
 pub(super) struct Rule {
     /// All weights at the start, by number of the synapse.
     weights: Vec<f32>,
     plastic: Vec<Plastic>,
     max_weight: f32,
-    /// Factors of the rewards from the activities on; none without reward.
+    /// Factors of the rewards, beginning at the step of the activities; `None` without reward.
     discounts: Option<Vec<f32>>,
-    /// What has an activity: neurons, nodes of encoders, inputs.
+    /// Number of rows with an activity: neurons, nodes of encoders, inputs.
     n_rows: usize,
 }
 
@@ -32,14 +33,15 @@ struct Plastic {
     synapse: usize,
     pre: usize,
     post: usize,
-    /// A, B, C and D, each with the learning rate in it.
+    /// A, B, C and D, each times the learning rate.
     coefficients: [f32; 4],
 }
 
-/// The weights of some neighbouring vectors of lanes, and what they will depend on.
+/// The weights in some neighbouring vectors of lanes, and the past activities and rewards that
+/// learning needs.
 #[derive(Debug)]
 pub(super) struct Memory {
-    /// Environment steps until now.
+    /// Number of environment steps so far.
     clock: usize,
     /// `[synapse][lane]`
     weights: Aligned,
@@ -50,7 +52,7 @@ pub(super) struct Memory {
 }
 
 impl Rule {
-    /// None if nothing changes.
+    /// The rule of a genotype; `None` if no weight is plastic.
     pub fn compile(network: &Network, phenotype: &Phenotype) -> Option<Self> {
         let config = network.learning.as_ref()?;
         let n_sources = network.n_neurons() + network.n_encoded();
@@ -82,12 +84,13 @@ impl Rule {
         })
     }
 
-    /// Environment steps whose activities are remembered.
+    /// Number of environment steps whose activities are stored.
     fn n_slots(&self) -> usize {
         self.discounts.as_ref().map_or(1, Vec::len)
     }
 
-    /// Start of an environment step: weights change. `rewards`: of the step before, per lane.
+    /// Changes the weights at the start of an environment step. `rewards`: of the previous step,
+    /// per lane.
     #[inline(always)]
     pub fn learn<S: Simd, const W: usize>(&self, simd: S, memory: &mut Memory, rewards: &[f32]) {
         let n_slots = self.n_slots();
@@ -130,7 +133,7 @@ impl Rule {
         }
     }
 
-    /// End of an environment step: its activities are remembered. `activities`: of neurons and
+    /// Stores the activities at the end of an environment step. `activities`: of neurons and
     /// nodes of encoders, times `scale`, `[row][lane]`.
     #[inline(always)]
     pub fn remember(

@@ -1,4 +1,4 @@
-//! Networks at work: which implementation each neuron model has.
+//! The dynamics of networks, with an implementation for each neuron model.
 //!
 //! To add a model: describe it in `experiment-file` (its module `neuron`), implement
 //! [`Dynamics`] in a module beside `ctrnn`, and add a variant to [`Wiring`].
@@ -20,9 +20,9 @@ use determinism::Isa;
 use determinism::random::Stream;
 use experiment_file::NeuronModel;
 
-/// The neurons of a network with their synapses, by one model, and their state in
-/// every lane. An implementation must give a lane the same bits whatever its place,
-/// its neighbours and the instruction set.
+/// The neurons of a network with their synapses, by one model, and their state in every lane. An
+/// implementation must give a lane the same bits for any place, any neighbouring lanes and any
+/// instruction set.
 pub(crate) trait Dynamics: fmt::Debug {
     /// Advances by one environment step, which is `Network::n_substeps` substeps.
     fn step(&mut self, inputs: Inputs<'_>);
@@ -30,8 +30,7 @@ pub(crate) trait Dynamics: fmt::Debug {
     /// Writes the activities that outputs decode: `[neuron][lane]`.
     fn write_activity(&self, activity: &mut Lanes);
 
-    /// Writes what the spikes of the last environment step leave for decoders. Rate
-    /// neurons have none.
+    /// Writes the spikes of the last environment step for decoders. Rate neurons have none.
     fn write_window(&self, _window: &mut SpikeWindow) {}
 
     /// Writes voltages, mV: `[neuron][lane]`; false if its neurons have none.
@@ -40,7 +39,7 @@ pub(crate) trait Dynamics: fmt::Debug {
     }
 }
 
-/// What a network gets in an environment step.
+/// The inputs of a network in an environment step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Inputs<'a> {
     /// Held for all substeps, `[input][lane]`.
@@ -48,15 +47,15 @@ pub(crate) struct Inputs<'a> {
     /// Uniform random numbers, substep by substep one for each of `Network::n_drawing` nodes,
     /// `[draw][lane]`.
     pub draws: &'a Lanes,
-    /// Reward of the step before, one row; none if nothing learns.
+    /// Reward of the previous step, one row; no rows without plasticity.
     pub rewards: &'a Lanes,
 }
 
-/// What the spikes of the neurons that outputs decode leave behind in an environment step,
-/// `[neuron][lane]`; of other neurons, nothing.
+/// Data of the spikes in an environment step for decoders, `[neuron][lane]`; only for neurons
+/// that outputs decode.
 #[derive(Debug)]
 pub(crate) struct SpikeWindow {
-    /// Spikes.
+    /// Numbers of spikes.
     pub counts: Lanes,
     /// The substep of the first spike, from 0; the number of substeps without one.
     pub first: Lanes,
@@ -64,7 +63,7 @@ pub(crate) struct SpikeWindow {
     pub filtered: Lanes,
 }
 
-/// What a neuron model makes of a network's structure, once for all genotypes.
+/// A neuron model's arrangement of a network's structure, shared by all genotypes.
 #[derive(Debug, Clone)]
 pub(crate) enum Wiring {
     /// [`NeuronModel::Rate`]
@@ -74,8 +73,7 @@ pub(crate) enum Wiring {
 }
 
 impl Wiring {
-    /// Of the neurons of some ensembles, the nodes of encoders, and the synapses that join
-    /// them.
+    /// The arrangement of ensembles, nodes of encoders, and the synapses between them.
     pub fn new(
         model: NeuronModel,
         ensembles: &IndexMap<String, Ensemble>,
@@ -97,25 +95,25 @@ impl Wiring {
     }
 }
 
-/// A network with its values in every lane, and what its neurons show.
+/// A network with its state in every lane, and the activities of its neurons.
 #[derive(Debug)]
 pub(crate) struct NetworkState {
     dynamics: Box<dyn Dynamics>,
     n_lanes: usize,
     /// `[neuron][lane]`. Read for every robot, hence not behind the trait.
     activity: Lanes,
-    /// None of rate neurons.
+    /// `None` for rate neurons.
     window: Option<SpikeWindow>,
-    /// What encoders draw from, per lane.
+    /// Random streams of encoders, per lane.
     streams: Vec<Stream>,
-    /// What they drew for this environment step, `[draw][lane]`.
+    /// The encoders' draws for this environment step, `[draw][lane]`.
     draws: Lanes,
-    /// The last rewards, one row; none if nothing learns.
+    /// The last rewards, one row; no rows without plasticity.
     rewards: Lanes,
 }
 
 impl NetworkState {
-    /// At rest in every lane.
+    /// A network at rest in every lane.
     pub fn new(isa: Isa, network: &Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
         let dynamics = compile(isa, network, phenotype, n_lanes);
         let rows = || Lanes::new(network.n_neurons(), n_lanes);
@@ -128,7 +126,7 @@ impl NetworkState {
         });
         let mut draws = Lanes::new(network.n_drawing() * network.n_substeps as usize, n_lanes);
         let rewards = Lanes::new(usize::from(network.learning.is_some()), n_lanes);
-        // Nothing spikes in lanes without a robot.
+        // Draws of 1 keep nodes in lanes without a robot from spiking.
         (0..draws.n_rows()).for_each(|draw| draws.row_mut(draw).fill(1.0));
         Self { dynamics, n_lanes, activity, window, streams: Vec::new(), draws, rewards }
     }
@@ -138,7 +136,7 @@ impl NetworkState {
         Self { streams, ..self }
     }
 
-    /// What a lane is rewarded with for the step before; 0 if nobody says.
+    /// Sets a lane's reward for the previous step; 0 if never set.
     pub fn reward(&mut self, lane: usize, reward: f32) {
         if self.rewards.n_rows() > 0 {
             self.rewards.set(0, lane, reward);
@@ -160,18 +158,18 @@ impl NetworkState {
         }
     }
 
-    /// Activities of the neurons, `[neuron][lane]`: of spiking ones, the share of the
-    /// substeps in which they spiked.
+    /// Activities of the neurons, `[neuron][lane]`; for spiking neurons, the share of substeps
+    /// with a spike.
     pub fn activity(&self) -> &Lanes {
         &self.activity
     }
 
-    /// The spikes of the last environment step; none of rate neurons.
+    /// The spikes of the last environment step; `None` for rate neurons.
     pub fn window(&self) -> Option<&SpikeWindow> {
         self.window.as_ref()
     }
 
-    /// Voltages of the neurons, mV, `[neuron][lane]`; none of rate neurons.
+    /// Voltages of the neurons, mV, `[neuron][lane]`; `None` for rate neurons.
     pub fn voltages(&self) -> Option<Lanes> {
         let n_neurons = self.activity.n_rows();
         let mut voltages = Lanes::new(n_neurons, self.n_lanes);

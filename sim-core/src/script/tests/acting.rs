@@ -1,4 +1,4 @@
-//! What scripts do: control robots, move lights and areas, have things happen.
+//! Actions of scripts: control robots, move lights and areas, react.
 
 use determinism::Isa;
 use determinism::random::TrialSet;
@@ -27,7 +27,7 @@ fn light(config: &mut ExperimentConfig) -> &mut LightController {
     light.unwrap()
 }
 
-/// Experiment D, with as many steps, whose robots this script controls.
+/// Experiment D with `n_steps` steps, whose robots this script controls.
 fn controlled(text: &str, n_steps: u32) -> ExperimentConfig {
     let mut config = with_script(experiment_d(), "t.star", text);
     config.algorithm.evaluation_steps = n_steps;
@@ -45,7 +45,7 @@ pub(super) fn watch(config: &ExperimentConfig) -> Vec<StepRecord> {
     steps
 }
 
-/// Why an episode ends.
+/// The failure of an episode.
 pub(super) fn failure(config: &ExperimentConfig) -> String {
     let simulation = Simulation::compile(config).unwrap();
     let genotype = vec![0.5; simulation.genotype_len()];
@@ -94,7 +94,7 @@ def fitness(world):
     assert_eq!(steps[20].fitness, Some(1.0));
 }
 
-/// Whatever the order in which a script decides for robots: all of them decide at once.
+/// All robots decide at the same time, in whatever order the script is called for them.
 #[test]
 fn a_robot_sees_what_others_did_not_what_they_are_about_to_do() {
     let text = "\
@@ -126,7 +126,8 @@ def fitness(world):
 ";
     let mut config = controlled(text, 40);
     let steps = watch(&config);
-    // What networks of the same robots get: they sense at the same places in the first step.
+    // Networks of the same robots get the same readings in the first step, because the robots are
+    // at the same places.
     robot(&mut config).controller = RobotController::NeuralController;
     let of_networks = watch(&config);
     let inputs = config.topology.stimuli.iter().scan(0, |first, (_, stimulus)| {
@@ -216,7 +217,7 @@ def fitness(world):
         assert_eq!(step.robots[0].failed, (20..40).contains(&step.step), "step {}", step.step);
         assert!(!(21..=40).contains(&step.step) || step.robots[0].led == 0, "step {}", step.step);
     }
-    // A robot that fails leaves the sectors of others to those behind it.
+    // When a robot fails, others hear the robots behind it instead.
     assert!(steps[25].robots.iter().skip(1).all(|robot| robot.received.is_some()));
 }
 

@@ -1,4 +1,4 @@
-//! What robots sense by a script.
+//! Readings that a script computes.
 
 use determinism::Isa;
 use determinism::random::TrialSet;
@@ -11,8 +11,8 @@ use crate::simulation::Simulation;
 use crate::stepping::Stepper;
 use crate::testing::{experiment_a, experiment_d, genotype};
 
-/// Experiment D, with as many steps, whose robots have a `script_sensor` of two values from -1 to
-/// 2, which their networks get.
+/// Experiment D with `n_steps` steps, whose robots have a `script_sensor` of two values from -1
+/// to 2, which their networks get.
 fn sensing(text: &str, n_steps: u32) -> ExperimentConfig {
     let config = with_script(experiment_d(), "t.star", text);
     let mut file = serde_json::to_value(&config).unwrap();
@@ -25,7 +25,7 @@ fn sensing(text: &str, n_steps: u32) -> ExperimentConfig {
     ExperimentConfig::from_json(&file.to_string(), "t", evolution::ALGORITHMS).unwrap().0
 }
 
-/// The robots of a configuration, whatever comes before them.
+/// The robots of a configuration, at any position among its objects.
 fn robots(config: &mut ExperimentConfig) -> &mut RobotConfig {
     let mut objects = config.world.objects.values_mut();
     let robots = objects.find_map(|object| match object {
@@ -200,7 +200,7 @@ fn a_sensor_needs_the_function_and_without_the_sensor_its_name_is_anybodys() {
     assert!(error.to_string().contains("t.star:1: `sense` takes 1 argument, not 2"), "{error}");
     let text = format!("{helper}{FITNESS}");
     Simulation::compile(&with_script(experiment_a(), "t.star", &text)).unwrap();
-    // A built-in fitness function with a sensor of the script's, and with nothing of it.
+    // A built-in fitness function, with a `script_sensor` and without one.
     let mut config = sensing("def sense(robot):\n    return [0, 1]", 10);
     config.algorithm.fitness_function = experiment_d().algorithm.fitness_function;
     Simulation::compile(&config).unwrap();

@@ -1,4 +1,4 @@
-//! The network in whole vectors of lanes: a weight is read once and applied to all
+//! Computes the network in whole vectors of lanes: it reads a weight once, and applies it to all
 //! lanes of some vectors.
 
 use std::mem;
@@ -27,13 +27,13 @@ pub(super) struct Chunk {
     state: Aligned,
     /// u, `[row][lane]`
     activity: Aligned,
-    /// What bias and inputs add to y in a substep, `[row][lane]`.
+    /// Contribution of bias and inputs to y per substep, `[row][lane]`.
     drive: Aligned,
     scratch: Aligned,
 }
 
 impl Chunk {
-    /// At rest.
+    /// A chunk at rest.
     pub fn new(kernel: &Kernel, first_lane: usize, width: usize, isa: Isa) -> Self {
         let n_lanes = width * isa.vector_len();
         let rows = || Aligned::new(kernel.n_rows() * n_lanes);
@@ -72,7 +72,7 @@ impl Chunk {
     }
 }
 
-/// What there is to do.
+/// A task for a chunk.
 enum Task<'a> {
     /// u = F(y).
     Activate,
@@ -106,8 +106,8 @@ impl<const W: usize> WithSimd for Work<'_, W> {
     }
 }
 
-// All that touches vectors is inlined into `with_simd`, which is compiled for the
-// vectors' instruction set; closures would not be, hence the plain loops.
+// All vector code is inlined into `with_simd`, which is compiled for the instruction set.
+// Closures would not be inlined, hence the plain loops.
 
 /// u = F(y).
 #[inline(always)]
@@ -152,8 +152,7 @@ fn perceive_blocks<S: Simd, const W: usize, const N: usize>(
     }
 }
 
-/// One Euler step, from `activity` to `scratch`. All of y is computed from the
-/// u before it.
+/// One Euler step, from `activity` to `scratch`. All of y follows from the previous u.
 #[inline(always)]
 fn integrate<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk) {
     let before = rows::<S, W>(chunk.activity.values());
@@ -189,7 +188,7 @@ fn integrate_blocks<S: Simd, const W: usize, const N: usize>(
     }
 }
 
-/// Adds what one row does to a block.
+/// Adds the contribution of one row to a block.
 #[inline(always)]
 fn accumulate<S: Simd, const W: usize, const N: usize>(
     simd: S,

@@ -1,4 +1,4 @@
-//! A network with its weights, in the order in which it is computed.
+//! A network with its weights, in the order of computation.
 
 use std::array;
 use std::ops::Range;
@@ -37,7 +37,7 @@ pub(super) struct Block<const N: usize> {
     pub start: [f32; N],
     /// Factor of y in a substep, 1 - r.
     pub retention: [f32; N],
-    /// What the bias adds to y in a substep.
+    /// Contribution of the bias to y per substep.
     pub drive: [f32; N],
     /// Its synapses in `Blocks::recurrent`.
     pub recurrent: Range<usize>,
@@ -45,13 +45,13 @@ pub(super) struct Block<const N: usize> {
     pub afferent: Range<usize>,
 }
 
-/// Synapses of one row with the neurons of a block. A block's are added up by ascending
-/// rows: the order is part of the format of a run.
+/// Synapses of one row with the neurons of a block. A block adds them up by ascending rows: the
+/// order is part of the format of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Coupling<const N: usize> {
     /// Row of the presynaptic neuron or input.
     pub pre: usize,
-    /// What its activity adds to y in a substep, per unit; 0 without a synapse.
+    /// Contribution to y per substep and unit of its activity; 0 without a synapse.
     pub weights: [f32; N],
 }
 
@@ -72,7 +72,7 @@ impl Kernel {
         quads.chain(self.pairs.blocks.iter().flat_map(|block| block.start))
     }
 
-    /// Inputs, up to the last one that has a synapse.
+    /// Number of inputs, up to the last one with a synapse.
     pub fn n_inputs(&self) -> usize {
         let quads = self.quads.afferent.iter().map(|coupling| coupling.pre);
         let pairs = self.pairs.afferent.iter().map(|coupling| coupling.pre);
@@ -85,7 +85,7 @@ impl Kernel {
         quads.chain(self.pairs.blocks.iter().map(|block| block.activation))
     }
 
-    /// Rows: twice the number of pairs.
+    /// Number of rows: twice the number of pairs.
     pub fn n_rows(&self) -> usize {
         4 * self.quads.blocks.len() + 2 * self.pairs.blocks.len()
     }

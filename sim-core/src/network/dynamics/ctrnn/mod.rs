@@ -4,8 +4,8 @@
 //! v(t+dt) = v + r * (-v + W_N u + W_I phi), u = F(g * (v + beta)), v(0) = 0,
 //! r = dt / tau.
 //!
-//! The state is kept as the exponent that F needs, y = k * g * (v + beta), k being
-//! F's [`squash::scale`]. Then a step is
+//! The state is stored as the exponent that F needs, y = k * g * (v + beta), where k is F's
+//! [`squash::scale`]. Then a step is
 //!
 //! y(t+dt) = (1 - r) * y + r * k * g * (W_N u + W_I phi + beta), u = F(y),
 //!
@@ -13,12 +13,11 @@
 //! within an environment step. It is computed in f32, which `docs/performance.md`
 //! justifies; all constants are computed in f64 and rounded once.
 //!
-//! All lanes share the weights; no value of one lane ever meets another's. Whole vectors
-//! of lanes are computed by [`chunk`], in blocks of neurons that share the loads of
-//! presynaptic activities. Lanes that are left over are computed by [`remainder`], to
-//! the same bits. Two neurons share a division; which ones is a matter of the network's
-//! structure alone. Networks whose weights change while robots live are computed by
-//! [`plastic`], where every lane has its own weights.
+//! All lanes share the weights, and never interact. [`chunk`] computes whole vectors of lanes, in
+//! blocks of neurons that share the loads of presynaptic activities. [`remainder`] computes the
+//! remaining lanes, to the same bits. Two neurons share a division; the pairs depend only on the
+//! network's structure. [`plastic`] computes networks whose weights change while robots live;
+//! there, every lane has its own weights.
 
 mod chunk;
 mod kernel;
@@ -43,13 +42,13 @@ pub(crate) struct Ctrnn {
     isa: Isa,
     kernel: Kernel,
     chunks: Vec<Chunk>,
-    /// The lanes that are too few for a vector.
+    /// The remaining lanes, too few for a vector.
     rest: Option<Rest>,
     /// The kernel's row of each neuron.
     rows: Vec<usize>,
 }
 
-/// Lanes that are computed apart.
+/// Lanes outside whole vectors.
 #[derive(Debug)]
 struct Rest {
     bundles: Bundles,
@@ -57,7 +56,7 @@ struct Rest {
 }
 
 impl Ctrnn {
-    /// At rest: v = 0 in every lane.
+    /// A network at rest: v = 0 in every lane.
     pub fn new(
         isa: Isa,
         network: &Network,
@@ -68,8 +67,8 @@ impl Ctrnn {
         let kernel = Kernel::compile(network, wiring, phenotype);
         let vector_len = isa.vector_len();
         let (mut n_vectors, mut n_left) = (n_lanes / vector_len, n_lanes % vector_len);
-        // A vector of lanes costs a vector of each row, a remainder's lane one of as many
-        // rows as a vector holds.
+        // A vector of lanes costs one vector operation per row. A lane of a remainder costs one
+        // per group of as many rows as a vector has lanes.
         let n_vectors_per_lane = kernel.n_rows().div_ceil(2 * vector_len) * 2;
         if 2 * n_left * n_vectors_per_lane > kernel.n_rows() {
             (n_vectors, n_left) = (n_vectors + 1, 0);

@@ -1,5 +1,5 @@
-//! The network with weights of its own in every lane, which change while robots live: the
-//! same equations, synapse by synapse.
+//! The network with plastic weights, which every lane has for itself: the same equations, synapse
+//! by synapse.
 //!
 //! y(t+dt) = (1 - r) y + r k g (W_N u + W_I phi) + r k g beta, with beta / g in place of beta
 //! where the gain does not multiply the bias.
@@ -26,7 +26,7 @@ pub(crate) struct PlasticCtrnn {
     chunks: Vec<Chunk>,
 }
 
-/// What all lanes have in common.
+/// The values that all lanes share.
 #[derive(Debug)]
 struct Kernel {
     n_substeps: u32,
@@ -42,9 +42,9 @@ struct Neuron {
     start: f32,
     /// Factor of y in a substep, 1 - r.
     retention: f32,
-    /// What the bias adds to y in a substep.
+    /// Contribution of the bias to y per substep.
     drive: f32,
-    /// What a unit of its current adds to y in a substep.
+    /// Contribution to y per substep and unit of its current.
     scale: f32,
     /// Presynaptic neuron and number of each synapse from neurons.
     recurrent: Vec<(usize, usize)>,
@@ -61,13 +61,13 @@ struct Chunk {
     /// u, `[neuron][lane]`
     activity: Aligned,
     scratch: Aligned,
-    /// What inputs add to the current, `[neuron][lane]`.
+    /// Contribution of inputs to the current, `[neuron][lane]`.
     drive: Aligned,
     memory: Memory,
 }
 
 impl PlasticCtrnn {
-    /// At rest: v = 0 in every lane.
+    /// A network at rest: v = 0 in every lane.
     pub fn new(isa: Isa, network: &Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
         let kernel = Kernel::compile(network, phenotype);
         let vector_len = isa.vector_len();
@@ -115,7 +115,7 @@ impl Kernel {
             match synapse.pre {
                 Source::Neuron(pre) => post.recurrent.push((pre, number)),
                 Source::Input(input) => post.afferent.push((input, number)),
-                // The reader sees to it that only spiking neurons take spikes.
+                // The reader guarantees that only spiking neurons take spikes.
                 Source::Encoded(_) => {}
             }
         }

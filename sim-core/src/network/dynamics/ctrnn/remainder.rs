@@ -1,7 +1,6 @@
-//! The network in the last lanes, which do not fill a vector: a vector holds neurons, and
-//! weights are read for each vector of neurons. The values are those of
-//! [`Chunk`](super::chunk::Chunk) in every bit, because a neuron adds up the same products
-//! in the same order; for a synapse that does not exist it adds zero.
+//! Computes the network in the last lanes, which do not fill a vector: here a vector holds
+//! neurons instead of lanes. The values have the same bits as in [`Chunk`](super::chunk::Chunk),
+//! because a neuron adds up the same products in the same order; a missing synapse adds zero.
 
 use std::mem;
 
@@ -17,8 +16,8 @@ use experiment_file::{Activation, InitialRates};
 /// Lanes of a remainder, at most.
 pub(super) const MAX_LANES: usize = 4;
 
-/// A kernel by vectors of neurons: bundles of as many pairs as a vector has lanes. A
-/// bundle has two vectors, one of the first and one of the second neurons of its pairs.
+/// A kernel in vectors of neurons. A bundle has as many pairs of neurons as a vector has lanes,
+/// in two vectors: one of the first and one of the second neurons of its pairs.
 #[derive(Debug)]
 pub(super) struct Bundles {
     n_substeps: u32,
@@ -26,7 +25,7 @@ pub(super) struct Bundles {
     initial_rates: InitialRates,
     /// F of each bundle.
     activations: Vec<Activation>,
-    /// Place of each row of the kernel among the values of a lane.
+    /// Index of each row of the kernel among the values of a lane.
     places: Vec<usize>,
     /// Vectors of start, retention and drive of each bundle, as in
     /// [`Block`](super::kernel::Block).
@@ -40,10 +39,10 @@ pub(super) struct Bundles {
 }
 
 impl Bundles {
-    /// The same network.
+    /// Arranges a kernel in bundles.
     pub fn new(kernel: &Kernel, isa: Isa) -> Self {
         let n = isa.vector_len();
-        // Pairs of one activation function to a bundle.
+        // All pairs of a bundle have the same activation function.
         let mut activations: Vec<Activation> = Vec::new();
         let mut places = Vec::new();
         let mut free = Vec::new();
@@ -105,7 +104,7 @@ impl Bundles {
         }
     }
 
-    /// Values per lane.
+    /// Number of values per lane.
     fn len(&self) -> usize {
         self.start.values().len()
     }
@@ -120,13 +119,13 @@ pub(super) struct Remainder {
     state: Aligned,
     /// u, `[lane][neuron]`
     activity: Aligned,
-    /// What bias and inputs add to y in a substep, `[lane][neuron]`.
+    /// Contribution of bias and inputs to y per substep, `[lane][neuron]`.
     drive: Aligned,
     scratch: Aligned,
 }
 
 impl Remainder {
-    /// At rest, in 1 to [`MAX_LANES`] lanes.
+    /// A remainder at rest, with 1 to [`MAX_LANES`] lanes.
     pub fn new(bundles: &Bundles, first_lane: usize, n_lanes: usize, isa: Isa) -> Self {
         let values = || Aligned::new(bundles.len() * n_lanes);
         let (state, activity, drive, scratch) = (values(), values(), values(), values());
@@ -166,7 +165,7 @@ impl Remainder {
     }
 }
 
-/// What there is to do.
+/// A task for a remainder.
 enum Task<'a> {
     /// u = F(y).
     Activate,
@@ -200,8 +199,8 @@ impl<const L: usize> WithSimd for Work<'_, L> {
     }
 }
 
-// All that touches vectors is inlined into `with_simd`, which is compiled for the
-// vectors' instruction set; closures would not be, hence the plain loops.
+// All vector code is inlined into `with_simd`, which is compiled for the instruction set.
+// Closures would not be inlined, hence the plain loops.
 
 /// u = F(y).
 #[inline(always)]
@@ -283,7 +282,7 @@ fn integrate<S: Simd, const L: usize>(simd: S, bundles: &Bundles, remainder: &mu
     }
 }
 
-/// Adds what one neuron or input does to a bundle.
+/// Adds the contribution of one neuron or input to a bundle.
 #[inline(always)]
 fn accumulate<S: Simd>(simd: S, sums: &mut [S::f32s; 2], weights: &[S::f32s; 2], activity: f32) {
     let activity = simd.splat_f32s(activity);

@@ -5,8 +5,8 @@
 //! division serves two neurons: a/b and c/d are a*d and c*b over b*d. Everything
 //! is IEEE arithmetic with fused multiply-adds, so all instruction sets agree.
 //!
-//! Errors, whatever the other neuron's y: sigmoid 3.5 ulp, down to 2^-63, where it
-//! stays; tanh 4.5 ulp.
+//! Errors, for any y of the other neuron: sigmoid 3.5 ulp, down to 2^-63, where it stays
+//! constant; tanh 4.5 ulp.
 
 use std::f64::consts::LOG2_E;
 

@@ -1,4 +1,4 @@
-//! The network against its equations, and against itself on other processors.
+//! Compares the network with its equations, and with itself on other instruction sets.
 
 use super::*;
 use crate::network::connections::Source;
@@ -7,7 +7,7 @@ use crate::problems::Problems;
 use crate::testing::experiment_a;
 use experiment_file::{Activation, ExperimentConfig, InitialRates};
 
-/// The equation as it stands, in f64, for one robot.
+/// The equation without rearrangement, in f64, for one robot.
 fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut [f64]) -> Vec<f64> {
     let activities = |v: &[f64]| -> Vec<f64> {
         let mut u = Vec::new();
@@ -56,9 +56,9 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
     (network, phenotype)
 }
 
-/// Experiment A's network, and variants with every kind of block: one ensemble of
-/// `tanh`, odd numbers of neurons, two groups of synapses that join the same neurons, more
-/// pairs of neurons than a vector has lanes; and neurons like the original's.
+/// Experiment A's network, and variants with every kind of block: one ensemble of `tanh`, odd
+/// numbers of neurons, two groups of synapses between the same neurons, more pairs of neurons
+/// than a vector has lanes; and neurons as in the original simulator.
 fn networks() -> [(Network, Phenotype); 5] {
     let mut tanh = experiment_a();
     tanh.topology.ensembles["H2"].activation = Some(Activation::Tanh);

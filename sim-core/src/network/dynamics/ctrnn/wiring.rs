@@ -1,5 +1,5 @@
-//! The order in which a network is computed: what of a [`Kernel`](super::kernel::Kernel)
-//! depends on the network's structure alone and is the same for all genotypes.
+//! The order of a network's computation: the part of a [`Kernel`](super::kernel::Kernel) that
+//! depends only on the network's structure, and that all genotypes share.
 
 use std::array;
 use std::collections::BTreeMap;
@@ -11,8 +11,9 @@ use crate::network::Ensemble;
 use crate::network::connections::{Source, Synapse};
 use experiment_file::Activation;
 
-/// Neurons in blocks of four and, what is left of ensembles, of two. A neuron's row is its
-/// place, blocks of four first; rows 2k and 2k+1 are a pair, which shares a division.
+/// Neurons in blocks of four, and the remaining ones of ensembles in blocks of two. A neuron's
+/// row is its position, blocks of four first. Rows 2k and 2k+1 are a pair, which shares a
+/// division.
 #[derive(Debug, Clone)]
 pub(crate) struct Wiring {
     /// Row of each neuron.
@@ -29,7 +30,7 @@ pub(crate) struct WiredBlocks<const N: usize> {
     pub recurrent: Vec<WiredCoupling<N>>,
     /// Synapses from inputs.
     pub afferent: Vec<WiredCoupling<N>>,
-    /// Numbers of synapses, those of the same neurons one after the other.
+    /// Numbers of synapses; those between the same neurons are adjacent.
     synapses: Vec<usize>,
 }
 
@@ -38,7 +39,7 @@ pub(crate) struct WiredBlocks<const N: usize> {
 pub(crate) struct WiredBlock<const N: usize> {
     /// F
     pub activation: Activation,
-    /// Its neurons; the last block of a function may have a place left.
+    /// Its neurons; the last block of a function may have an empty place.
     pub neurons: [Option<usize>; N],
     /// Its synapses in `WiredBlocks::recurrent`.
     pub recurrent: Range<usize>,
@@ -55,8 +56,8 @@ pub(crate) struct WiredCoupling<const N: usize> {
     synapses: [Range<usize>; N],
 }
 
-/// Numbers of a neuron's synapses by their presynaptic row. Two groups of synapses may
-/// join the same neurons.
+/// Numbers of a neuron's synapses by their presynaptic row; there may be several per row, from
+/// several groups.
 type Incoming = BTreeMap<usize, Vec<usize>>;
 
 impl Wiring {
@@ -78,7 +79,7 @@ impl Wiring {
             let same = match synapse.pre {
                 Source::Neuron(pre) => recurrent.entry(rows[pre]),
                 Source::Input(pre) => afferent.entry(pre),
-                // The reader sees to it that only spiking neurons take spikes.
+                // The reader guarantees that only spiking neurons take spikes.
                 Source::Encoded(_) => continue,
             };
             same.or_default().push(number);
@@ -95,7 +96,7 @@ impl Wiring {
 }
 
 impl<const N: usize> WiredBlocks<N> {
-    /// Numbers of the synapses at a place of a coupling, ascending; there may be none.
+    /// Numbers of the synapses at a place of a coupling, ascending; may be empty.
     #[inline(always)]
     pub fn synapses(&self, coupling: &WiredCoupling<N>, place: usize) -> &[usize] {
         &self.synapses[coupling.synapses[place].clone()]
@@ -126,7 +127,7 @@ impl<const N: usize> WiredBlocks<N> {
     }
 }
 
-/// Adds couplings, given as rows and synapses, and returns where they are.
+/// Adds couplings, given as rows and synapses, and returns their range.
 fn append<const N: usize>(
     couplings: &mut Vec<WiredCoupling<N>>,
     added: BTreeMap<usize, [Range<usize>; N]>,
@@ -143,13 +144,13 @@ struct Members {
 }
 
 impl Members {
-    /// Neighbours of an ensemble first, because they have most of their presynaptic
-    /// neurons in common, then what ensembles have left over.
+    /// First neighbours within an ensemble, because they share most of their presynaptic neurons,
+    /// then the remaining neurons of all ensembles.
     fn from_ensembles(ensembles: &IndexMap<String, Ensemble>) -> Self {
         let (mut quads, mut pairs) = (Vec::new(), Vec::new());
         let mut left_over = [(Activation::Sigmoid, None), (Activation::Tanh, None)];
         for ensemble in ensembles.values() {
-            // The reader gives every ensemble of rate neurons one.
+            // The reader gives every ensemble of rate neurons an activation function.
             let function = ensemble.activation.unwrap_or_default();
             let neurons: Vec<usize> = ensemble.neurons.clone().collect();
             let (of_four, rest) = neurons.as_chunks();

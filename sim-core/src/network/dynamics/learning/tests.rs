@@ -1,4 +1,4 @@
-//! Networks that learn, against themselves and against those that do not.
+//! Compares networks that learn with themselves, and with networks that do not.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use experiment_file::{
     Neurotransmitter, ReceptiveField, RewardConfig, SynapseModel, SynapseParams,
 };
 
-/// What a test looks at: all neurons, step by step.
+/// The compared bits: all neurons, step by step.
 type Bits = Vec<u32>;
 
 /// Rate neurons, and LIF neurons with static and with dynamic synapses and an encoder.
@@ -66,7 +66,7 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
     (network, phenotype)
 }
 
-/// Activities of one lane after each of some steps, beside which there are other lanes.
+/// Activities of one lane, among other lanes, after each of some steps.
 fn activities(
     (network, phenotype): &(Network, Phenotype),
     isa: Isa,
@@ -106,7 +106,7 @@ fn what_does_not_learn_is_as_if_it_could_not() {
         if config.topology.neuron_model.is_spiking() {
             assert_eq!(bits(still), bits(rigid));
         } else {
-            // Rate neurons that learn are computed in another order.
+            // Plastic networks of rate neurons add up in another order.
             for (still, rigid) in still.into_iter().zip(rigid) {
                 assert!((still - rigid).abs() < 1e-5, "{still}, {rigid}");
             }

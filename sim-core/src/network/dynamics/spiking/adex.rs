@@ -12,7 +12,7 @@ use super::model::{FLOOR, Model, Parameters};
 const PEAK: f32 = 30.0;
 /// Time constant of the threshold, ms.
 const TAU_THETA: f64 = 50.0;
-/// What a spike adds to the threshold, mV per ms of the step.
+/// Rise of the threshold by a spike, mV per ms of the step.
 const THETA_RISE: f64 = 20.0;
 
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! Neurons against Brian2: the fixtures are made by `sim-core/tests/fixtures/neurons.py`.
+//! Compares neurons with Brian2; `sim-core/tests/fixtures/neurons.py` makes the fixtures.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::testing::experiment_a_spiking;
 use determinism::Isa;
 use experiment_file::{NeuronModel, Neurotransmitter, SynapseModel, SynapseParams};
 
-/// Between rest and the peak of a spike, about, mV.
+/// Approximate voltage from rest to the peak of a spike, mV.
 const SPAN: f64 = 100.0;
 
 fn fixture() -> Value {
@@ -28,7 +28,7 @@ fn numbers(value: &Value) -> impl Iterator<Item = f64> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap())
 }
 
-/// Compares spikes, and every so many voltages.
+/// Compares all spikes, and samples of the voltages.
 fn assert_follows(name: &str, spikes: &[usize], voltages: &[f32], every: usize, expected: &Value) {
     let times: Vec<usize> = expected["spikes"].as_array().unwrap().iter().map(number).collect();
     assert_eq!(spikes, times, "{name}");

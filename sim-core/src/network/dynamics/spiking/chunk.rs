@@ -1,4 +1,4 @@
-//! The network in some vectors of lanes: substep by substep, synapses and neurons.
+//! Computes the network in some vectors of lanes, substep by substep: synapses, then neurons.
 
 use pulp::{Simd, WithSimd};
 
@@ -31,16 +31,16 @@ pub(super) struct Chunk {
     /// 1 where a neuron spiked in the last substep, or a node of an encoder in this one, else
     /// 0: `[neuron, then node][lane]`.
     spikes: Aligned,
-    /// The neurons and nodes of which that is true in any lane, ascending.
+    /// The neurons and nodes with a spike in any lane, ascending.
     active: Vec<usize>,
-    /// What stimuli add to the current, `[neuron][lane]`.
+    /// Contribution of stimuli to the current, `[neuron][lane]`.
     drive: Aligned,
     /// `[neuron][lane]`
     current: Aligned,
-    /// Of dynamic synapses.
+    /// The state of dynamic synapses.
     receptors: Option<ReceptorState>,
     encoders: EncoderState,
-    /// Weights that change; none if they are shared.
+    /// Plastic weights; `None` if all lanes share the weights.
     memory: Option<Memory>,
     /// Spikes in the environment step, `[neuron, then node][lane]`.
     counts: Aligned,
@@ -50,7 +50,7 @@ pub(super) struct Chunk {
 }
 
 impl Chunk {
-    /// At rest.
+    /// A chunk at rest.
     pub fn new<M: Model<C, Z>, const C: usize, const Z: usize>(
         circuit: &Circuit,
         neurons: &Neurons<M, C, Z>,
@@ -105,7 +105,7 @@ impl Chunk {
         }
     }
 
-    /// With W vectors per row; with PLASTIC, weights change.
+    /// One environment step with W vectors per row; with PLASTIC, weights change.
     fn step<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool>(
         &mut self,
         circuit: &Circuit,
@@ -138,7 +138,7 @@ impl Chunk {
         }
     }
 
-    /// Writes what decoders read of motor neurons.
+    /// Writes the data of motor neurons for decoders.
     pub fn write_window(&self, circuit: &Circuit, window: &mut SpikeWindow) {
         let n_lanes = self.n_lanes;
         let motor = self.motor.values().chunks_exact(3 * n_lanes);
@@ -164,12 +164,12 @@ impl Chunk {
     }
 }
 
-// The stages of a step are compiled apart, for each instruction set: neurons for each model, all
-// else once. What touches vectors is inlined into `with_simd`, which is compiled for the vectors'
-// instruction set; closures would not be, hence the plain loops.
+// The stages of a step are compiled separately for each instruction set: neurons for each model,
+// everything else once. All vector code is inlined into `with_simd`, which is compiled for the
+// instruction set. Closures would not be inlined, hence the plain loops.
 
-/// The start of an environment step, in W vectors per row: what the stimuli add to currents.
-/// With PLASTIC, weights learn from the step before. Nothing has spiked yet.
+/// The start of an environment step, in W vectors per row: computes the contribution of stimuli
+/// to currents. With PLASTIC, weights learn from the previous step. Resets the spikes.
 struct Perceive<'a, const W: usize, const PLASTIC: bool> {
     circuit: &'a Circuit,
     chunk: &'a mut Chunk,
@@ -211,8 +211,8 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
     }
 }
 
-/// The spikes of the nodes of encoders in a substep, and the current of every neuron from those
-/// and from the neurons' spikes in the substep before.
+/// Computes the spikes of encoders' nodes in a substep, and the current of every neuron from
+/// these and from the neurons' spikes in the previous substep.
 struct Propagate<'a, const W: usize, const PLASTIC: bool> {
     circuit: &'a Circuit,
     chunk: &'a mut Chunk,
@@ -323,7 +323,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
     }
 }
 
-/// What decoders keep of the motor neurons' spikes.
+/// Updates the decoders' data of motor neurons.
 struct Listen<'a, const W: usize> {
     circuit: &'a Circuit,
     chunk: &'a mut Chunk,

@@ -1,5 +1,5 @@
-//! A spiking network with its values, in the order in which it is computed; apart from what its
-//! neurons do, which is in [`neurons`](super::neurons).
+//! A spiking network with its values, in the order of computation; [`neurons`](super::neurons)
+//! computes the neurons themselves.
 
 use std::ops::Range;
 
@@ -16,19 +16,19 @@ use crate::network::{Network, Phenotype};
 pub(super) struct Circuit {
     pub n_neurons: usize,
     pub n_substeps: u32,
-    /// Makes spikes of stimuli.
+    /// The encoders, which turn stimuli into spikes.
     pub encoders: Encoders,
-    /// Synapses from stimuli that act as they are, by postsynaptic neuron.
+    /// Synapses from stimuli without an encoder, by postsynaptic neuron.
     pub afferent: Weighted,
-    /// Static synapses from what spikes, by presynaptic side: neurons, then nodes of encoders.
+    /// Static synapses from spike sources, by presynaptic side: neurons, then nodes of encoders.
     pub outgoing: Weighted,
-    /// Dynamic synapses from what spikes; none if they are static.
+    /// Dynamic synapses from spike sources; `None` if the synapses are static.
     pub receptors: Option<Receptors>,
-    /// How weights change while robots live; none: they do not.
+    /// The learning rule; `None` without plasticity.
     pub rule: Option<Rule>,
     /// Neurons that outputs decode, ascending.
     pub motor: Vec<usize>,
-    /// What decoders filter spikes with.
+    /// The filter of spikes for decoders.
     pub filter: Filter,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct Circuit {
 #[derive(Debug)]
 pub(super) struct Weighted {
     groups: Vec<Range<usize>>,
-    /// The side that the group does not have in common, and the weight.
+    /// The other side of each synapse, which differs within the group, and its weight.
     members: Vec<(usize, f32)>,
     /// The number of each synapse.
     numbers: Vec<usize>,
@@ -83,7 +83,7 @@ impl Circuit {
         }
     }
 
-    /// What spikes: neurons and nodes of encoders.
+    /// Number of spike sources: neurons and nodes of encoders.
     pub fn n_sources(&self) -> usize {
         self.n_neurons + self.encoders.n_nodes()
     }
@@ -110,8 +110,8 @@ impl Weighted {
     }
 }
 
-/// The weight of a synapse in W vectors of lanes: what all lanes share, or with PLASTIC what
-/// each has now, `[synapse]`.
+/// The weight of a synapse in W vectors of lanes: the shared one, or with PLASTIC each lane's
+/// present one, `[synapse]`.
 #[inline(always)]
 pub(super) fn weight<S: Simd, const W: usize, const PLASTIC: bool>(
     simd: S,

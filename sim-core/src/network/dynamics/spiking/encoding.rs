@@ -21,7 +21,8 @@ use experiment_file::{
     EncodingScheme, NeuronModel, RadialField, RadialShape, ReceptiveField, limits,
 };
 
-/// Variables of a node: v and refractory substeps of LIF encoders, survival of Poisson ones.
+/// Number of variables of a node: v and refractory substeps in LIF encoders, survival in Poisson
+/// ones.
 const N_VARIABLES: usize = 2;
 
 /// The encoders of a network, with the weights of a genotype.
@@ -29,7 +30,7 @@ const N_VARIABLES: usize = 2;
 pub(super) struct Encoders {
     encoders: Vec<Encoder>,
     n_nodes: usize,
-    /// Nodes that draw in every substep.
+    /// Number of nodes that draw in every substep.
     n_drawing: usize,
     n_substeps: u32,
     lif: [f32; 5],
@@ -38,16 +39,16 @@ pub(super) struct Encoders {
 #[derive(Debug)]
 struct Encoder {
     scheme: EncodingScheme,
-    /// Rows of its stimulus.
+    /// The rows of its stimulus.
     inputs: Range<usize>,
     /// Its nodes among those of all encoders.
     nodes: Range<usize>,
-    /// Its first draw of a substep.
+    /// Index of its first draw in a substep.
     first_draw: usize,
     field: Field,
 }
 
-/// Values of a stimulus to values of nodes.
+/// A receptive field, which turns values of a stimulus into values of nodes.
 #[derive(Debug)]
 enum Field {
     Identity,
@@ -63,7 +64,7 @@ enum Field {
     Linear(Vec<f32>),
 }
 
-/// What the nodes of a chunk hold.
+/// The state of the nodes of a chunk.
 #[derive(Debug)]
 pub(super) struct EncoderState {
     /// Values of the nodes in this environment step, `[node][lane]`.
@@ -445,8 +446,8 @@ mod tests {
         assert_eq!(expected[0], 0);
     }
 
-    /// The chance of no spike for k substeps is the product of (1 - x / 10,000)^j, j from 1
-    /// to k; their sum is the mean interval.
+    /// The probability of no spike for k substeps is the product of (1 - x / 10,000)^j for j from
+    /// 1 to k; the sum of these is the mean interval.
     #[test]
     fn poisson_nodes_spike_as_often_as_their_survival_says() {
         let identity = ReceptiveField::Identity {};

@@ -14,7 +14,7 @@ const PEAK: f32 = 30.0;
 #[derive(Debug)]
 pub(super) struct ExpLif;
 
-/// v, and for how many substeps the neuron is refractory.
+/// State: v, and the remaining refractory substeps.
 impl Model<4, 2> for ExpLif {
     fn constants(p: Parameters<'_>, dt: f64) -> [f64; 4] {
         [dt / p("tau"), p("v_rest"), p("thresh"), p("time_refrac")]

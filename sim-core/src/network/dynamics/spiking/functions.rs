@@ -1,7 +1,7 @@
 //! Functions of the neuron models, from IEEE arithmetic with fused multiply-adds alone.
 //!
-//! Errors: exp 3e-6 of its value for |x| <= 43, beyond which it stays as 2^63 or 2^-63;
-//! cosh likewise; tanh 3e-7.
+//! Relative errors: exp 3e-6 for |x| <= 43, beyond which it stays at about 2^63 or 2^-63; cosh
+//! likewise; tanh 3e-7.
 
 use std::f32::consts::LOG2_E;
 

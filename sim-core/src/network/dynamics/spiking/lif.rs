@@ -8,7 +8,7 @@ use super::model::{FLOOR, Model, Parameters};
 #[derive(Debug)]
 pub(super) struct Lif;
 
-/// v, and for how many substeps the neuron is refractory.
+/// State: v, and the remaining refractory substeps.
 impl Model<5, 2> for Lif {
     fn constants(p: Parameters<'_>, dt: f64) -> [f64; 5] {
         [dt / p("tau"), p("v_rest"), p("R"), p("thresh"), p("time_refrac")]
@@ -35,7 +35,7 @@ impl Model<5, 2> for Lif {
     }
 }
 
-/// The current that a neuron takes, and the substeps that it then still waits.
+/// The effective current of a neuron, and its refractory substeps after this one.
 #[inline(always)]
 pub(super) fn gate<S: Simd>(simd: S, waiting: S::f32s, current: S::f32s) -> (S::f32s, S::f32s) {
     let zero = simd.splat_f32s(0.0);

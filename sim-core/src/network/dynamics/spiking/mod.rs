@@ -1,13 +1,11 @@
-//! Networks of spiking neurons, by synchronous Euler steps (section 4.1 of the thesis):
-//! in every substep, each neuron takes the current I = W s of the spikes s of the substep
-//! before, and W_I phi of the stimuli, which are held for an environment step. Stimuli with
-//! an encoder act by spikes of its nodes instead, those of the same substep.
-//! `docs/neurons.md` has the models.
+//! Networks of spiking neurons, by synchronous Euler steps (section 4.1 of the thesis): in every
+//! substep, each neuron takes the current I = W s of the spikes s of the substep before, and W_I
+//! phi of the stimuli, which are held for an environment step. Stimuli with an encoder act
+//! through the spikes of its nodes in the same substep instead. `docs/neurons.md` has the models.
 //!
-//! It is computed in f32; constants are computed in f64 and rounded once. All lanes share
-//! the weights; no value of one lane ever meets another's. What a neuron does to others is
-//! added up source by source, and a neuron that spikes in no lane of a chunk costs
-//! nothing: what it would add is zero, which changes no sum.
+//! The state is computed in f32; constants are computed in f64 and rounded once. All lanes share
+//! the weights, and never interact. The code adds up currents source by source, and skips neurons
+//! that spike in no lane of a chunk: they would add zero, which changes no sum.
 
 mod adex;
 mod chunk;
@@ -34,7 +32,7 @@ use model::Model;
 use neurons::Neurons;
 pub(super) use wiring::Wiring;
 
-/// A network of spiking neurons, by their model, at rest.
+/// A network of spiking neurons of some model, at rest.
 pub(super) fn compile(
     isa: Isa,
     network: &Network,
@@ -78,7 +76,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Spiking<M, C, Z> {
         let neurons = Neurons::compile(network, phenotype);
         let vector_len = isa.vector_len();
         let n_vectors = n_lanes.div_ceil(vector_len);
-        // Weights of their own take most of what a chunk of lanes holds.
+        // With plasticity, the weights of each lane take most of the memory of a chunk.
         let max_width = if circuit.rule.is_some() { 1 } else { chunk::MAX_WIDTH };
         let chunks = (0..n_vectors).step_by(max_width).map(|first| {
             let width = max_width.min(n_vectors - first);
@@ -96,7 +94,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Dynamics for Spiking<M, C, 
         }
     }
 
-    /// The share of the substeps in which it spiked.
+    /// Writes the share of substeps with a spike.
     fn write_activity(&self, activity: &mut Lanes) {
         for chunk in &self.chunks {
             chunk.write_activity(&self.circuit, activity);

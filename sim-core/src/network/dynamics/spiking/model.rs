@@ -1,5 +1,4 @@
-//! What a model of spiking neurons computes: one substep of one neuron in a vector of
-//! lanes.
+//! The interface of models of spiking neurons: one substep of one neuron in a vector of lanes.
 
 use std::fmt;
 
@@ -8,21 +7,21 @@ use pulp::Simd;
 /// The parameters of one neuron, by name.
 pub(super) type Parameters<'a> = &'a dyn Fn(&str) -> f64;
 
-/// No voltage falls below it, mV: a guard that keeps numbers finite, far from what any
-/// neuron does.
+/// Lower bound of all voltages, mV: it keeps numbers finite, and is far below the voltages of any
+/// neuron.
 pub(super) const FLOOR: f32 = -1e6;
 
 /// A model with C constants and Z state variables per neuron, the first of which is the
 /// voltage v, mV.
 pub(super) trait Model<const C: usize, const Z: usize>: fmt::Debug {
-    /// What stays the same in all substeps. `dt`: ms.
+    /// The constants of a neuron. `dt`: ms.
     fn constants(parameters: Parameters<'_>, dt: f64) -> [f64; C];
 
     /// The state before the first substep: v at rest, the others at their fixed point.
     fn start(parameters: Parameters<'_>) -> [f64; Z];
 
-    /// One explicit Euler step with a synaptic current. Returns the state after it, and
-    /// which lanes spike.
+    /// One explicit Euler step with a synaptic current. Returns the new state, and the lanes with
+    /// a spike.
     fn update<S: Simd>(
         simd: S,
         constants: [S::f32s; C],

@@ -9,11 +9,11 @@ use pulp::Simd;
 use super::functions::{cosh, tanh};
 use super::model::{Model, Parameters};
 
-/// Range of the voltage, mV.
+/// Lowest voltage, mV.
 const LOWEST: f32 = -85.0;
-/// Likewise.
+/// Highest voltage, mV.
 const HIGHEST: f32 = 40.0;
-/// From here on a neuron spikes, mV.
+/// Voltage from which on a neuron spikes, mV.
 const SPIKE: f32 = 35.5;
 /// Voltage at the start, mV.
 const START: f64 = -50.0;

@@ -1,4 +1,4 @@
-//! The neurons of a network, by their model.
+//! The neurons of a network, of some model.
 
 use std::marker::PhantomData;
 
@@ -8,9 +8,9 @@ use crate::network::{Network, Phenotype};
 /// The values of a genotype for neurons of model M.
 #[derive(Debug)]
 pub(super) struct Neurons<M, const C: usize, const Z: usize> {
-    /// Per neuron.
+    /// Constants per neuron.
     pub constants: Vec<[f32; C]>,
-    /// Per neuron.
+    /// Start state per neuron.
     pub starts: Vec<[f32; Z]>,
     model: PhantomData<M>,
 }

@@ -2,12 +2,12 @@
 //! axon, opens receptors of the axon, and these drive a current into every postsynaptic
 //! neuron.
 //!
-//! Of each axon: s_ampa = 1 when a spike arrives, else s_ampa -= dt s_ampa / tau; s_gaba
-//! likewise; x = 1, else x -= dt x / tau_rise, then
-//! s_nmda += dt (0.5 x (1 - s_nmda) - s_nmda / tau_decay).
+//! For each axon: s_ampa = 1 when a spike arrives, else s_ampa -= dt s_ampa / tau; s_gaba
+//! likewise; x = 1 when a spike arrives, else x -= dt x / tau_rise, and then s_nmda += dt (0.5 x
+//! (1 - s_nmda) - s_nmda / tau_decay).
 //!
-//! Of each neuron: I = sum over receptors of gain * (W s) * (E - v), where NMDA's is divided
-//! by 1 + Mg2 exp(-0.062 v) / 3.57. Without E the last factor is 1, of GABA -1.
+//! For each neuron: I = sum over receptors of gain * (W s) * (E - v), where the term of NMDA is
+//! divided by 1 + Mg2 exp(-0.062 v) / 3.57. Without E, the last factor is 1, and -1 for GABA.
 
 use pulp::Simd;
 
@@ -20,31 +20,31 @@ use experiment_file::{SynapseParams, limits};
 
 /// Variables of an axon: s_ampa, s_gaba, x, s_nmda.
 const N_VARIABLES: usize = 4;
-/// Substeps whose spikes may still be on their way.
+/// Number of substeps for which spikes are stored: the longest delay.
 const N_SLOTS: usize = *limits::DELAYS.end() as usize;
 
 /// Dynamic synapses with the values of a genotype.
 #[derive(Debug)]
 pub(super) struct Receptors {
-    /// Per axon, those of neurons and then those of nodes of encoders: substeps.
+    /// Delay per axon, substeps: axons of neurons, then of nodes of encoders.
     delays: Vec<usize>,
-    /// By postsynaptic neuron, one for each receptor.
+    /// Synapses by postsynaptic neuron, one group for each receptor.
     incoming: [Weighted; 3],
     /// Gain and reversal potential of each receptor.
     drives: [(f32, Option<f32>); 3],
-    /// What is left of s_ampa, s_gaba and x after a substep.
+    /// Factors of s_ampa, s_gaba and x per substep.
     retention: [f32; 3],
-    /// Of s_nmda.
+    /// The rise of s_nmda per substep.
     rise: f32,
     decay: f32,
     /// Mg2 / 3.57
     magnesium: f32,
 }
 
-/// What axons and receptors of a chunk hold.
+/// The state of axons and receptors in a chunk.
 #[derive(Debug)]
 pub(super) struct ReceptorState {
-    /// Substeps until now.
+    /// Number of substeps so far.
     clock: usize,
     /// Spikes of the last substeps, `[slot][axon][lane]`.
     history: Aligned,
@@ -78,9 +78,9 @@ impl Receptors {
         }
     }
 
-    /// Adds to the currents of a substep. `spikes`: of neurons in the substep before, and of
-    /// nodes of encoders. `states`: of the neurons, `n_variables` each, the first of which is v.
-    /// `weights`: of plastic synapses, by their number.
+    /// Adds the synaptic currents of a substep. `spikes`: of neurons in the previous substep, and
+    /// of nodes of encoders in this one. `states`: of the neurons, `n_variables` each; v comes
+    /// first. `weights`: of plastic synapses, by their number.
     #[inline(always)]
     pub fn propagate<S: Simd, const W: usize, const PLASTIC: bool>(
         &self,
@@ -103,7 +103,7 @@ impl Receptors {
         let [left_ampa, left_gaba, left_x] = self.retention.map(|left| simd.splat_f32s(left));
         let (rise, decay) = (simd.splat_f32s(self.rise), simd.splat_f32s(self.decay));
         for (axon, [ampa, gaba, x, nmda]) in open.iter_mut().enumerate() {
-            // A delay of 1 is that of a static synapse.
+            // A delay of 1 equals the delay of a static synapse.
             let arrived = &history[slot(self.delays[axon] - 1) + axon];
             for vector in 0..W {
                 let spiked = simd.equal_f32s(arrived[vector], one);
@@ -160,7 +160,7 @@ impl Receptors {
 }
 
 impl ReceptorState {
-    /// All closed, nothing on its way.
+    /// All receptors closed, without spikes on their way.
     pub fn new(n_axons: usize, n_lanes: usize) -> Self {
         let rows = |n: usize| Aligned::new(n * n_axons * n_lanes);
         Self { clock: 0, history: rows(N_SLOTS), open: rows(N_VARIABLES) }

@@ -1,4 +1,4 @@
-//! Spiking networks against themselves, on other processors and in other lanes.
+//! Compares spiking networks with themselves, on other instruction sets and in other lanes.
 
 use crate::lanes::Lanes;
 use crate::network::dynamics::NetworkState;
@@ -51,7 +51,7 @@ fn networks(time_scale: u32) -> Vec<(Network, Phenotype)> {
     networks.chain([dynamic, compiled(&config)]).collect()
 }
 
-/// An encoder of each scheme, before it a field of each kind.
+/// An encoder of each scheme, with a field of each kind.
 fn encode(config: &mut ExperimentConfig) {
     let values = [0.0, 3_000.0];
     let gaussian = GaussianField {
@@ -83,7 +83,7 @@ fn encode(config: &mut ExperimentConfig) {
     }
 }
 
-/// The state of a network in some lanes, each of which has a stream of its own.
+/// The state of a network in some lanes, each with a stream of its own.
 fn start(
     (network, phenotype): &(Network, Phenotype),
     isa: Isa,

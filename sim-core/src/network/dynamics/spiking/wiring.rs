@@ -1,5 +1,5 @@
-//! The order in which the synapses of a spiking network are computed: what of a
-//! [`Circuit`](super::circuit::Circuit) depends on the network's structure alone.
+//! The order in which synapses of a spiking network are computed: the part of a
+//! [`Circuit`](super::circuit::Circuit) that depends only on the network's structure.
 
 use std::ops::Range;
 
@@ -8,19 +8,19 @@ use indexmap::IndexMap;
 use crate::network::connections::{Source, Synapse, SynapseGroup};
 use experiment_file::Neurotransmitter;
 
-/// Synapses by what starts them or where they end.
+/// Synapses, grouped by their presynaptic or postsynaptic side.
 #[derive(Debug, Clone)]
 pub(crate) struct Wiring {
     /// Synapses from stimuli, by postsynaptic neuron; a neuron's ascend by their input.
     pub afferent: Grouped,
-    /// Static synapses from what spikes, by presynaptic side: neurons, then nodes of encoders.
+    /// Static synapses from spike sources, by presynaptic side: neurons, then nodes of encoders.
     pub outgoing: Grouped,
-    /// Dynamic synapses from what spikes that open a receptor, by postsynaptic neuron, one of
-    /// each [`Receptor`].
+    /// Dynamic synapses from spike sources, by postsynaptic neuron, one group for each
+    /// [`Receptor`].
     pub receptive: [Grouped; 3],
 }
 
-/// What opens when a dynamic synapse has a spike, in the order of [`Wiring::receptive`].
+/// The receptors of dynamic synapses, in the order of [`Wiring::receptive`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Receptor {
     Ampa,
@@ -31,17 +31,17 @@ pub(crate) enum Receptor {
 /// Synapses in groups.
 #[derive(Debug, Clone)]
 pub(crate) struct Grouped {
-    /// Of each group: its members.
+    /// The range of each group's members.
     pub groups: Vec<Range<usize>>,
-    /// Group by group.
+    /// The members, group by group.
     pub members: Vec<Member>,
 }
 
 /// A synapse in its group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Member {
-    /// The side that the group does not have in common: an input, or a neuron, or after the
-    /// last neuron a node of an encoder.
+    /// The other side, which differs within the group: an input or a neuron; numbers after the
+    /// last neuron are nodes of encoders.
     pub other: usize,
     /// Number of the synapse.
     pub synapse: usize,
