@@ -1,9 +1,9 @@
-//! Everything that can be killed, frozen, cut off or blocked is, at random and
-//! for a while, beside workers that lie, fail and hang, and every experiment comes to the
-//! digest of an undisturbed run.
+//! For a while, random faults kill, freeze, cut off and block all parts of a fleet, beside
+//! workers that lie, fail and hang. Every experiment still ends with the digest of an undisturbed
+//! run.
 //!
-//! `SWARM_SOAK_SECONDS` says for how long, `SWARM_SOAK_SEED` repeats the choices
-//! of a run (though not its timing).
+//! `SWARM_SOAK_SECONDS` sets the duration, and `SWARM_SOAK_SEED` repeats the choices of a run
+//! (though not its timing).
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{
@@ -34,7 +34,7 @@ use tokio::{runtime::Runtime, task::JoinHandle};
 const DEFAULT_SECONDS: u64 = 3;
 const GENERATIONS: u64 = 20;
 const N_WORKERS: usize = 4;
-/// Short, so that the pauses are longer and shorter than it.
+/// Short, so that pauses are sometimes longer and sometimes shorter.
 const LEASE: &str = "1";
 const PAUSE_MS_MAX: u64 = 400;
 
@@ -95,9 +95,9 @@ struct Soak {
     coordinator: CoordinatorProcess,
     places: Vec<Place>,
     n_workers_started: usize,
-    /// Where the workers run that are no processes.
+    /// The runtime of workers that are not processes.
     runtime: Runtime,
-    /// The latest bad workers of each kind: another takes the place of the one before.
+    /// The latest bad worker of each kind; a new one replaces the previous one.
     intruders: BTreeMap<Fault, JoinHandle<()>>,
     experiment: Experiment,
     expected: Vec<String>,
@@ -139,8 +139,7 @@ impl Soak {
         self.random.next_u64() % n
     }
 
-    /// How long something lasts: part of the fault, not a way to wait for
-    /// something.
+    /// The duration of a fault, which is part of the fault and not a way of waiting.
     fn pause(&mut self) {
         let pause_ms = self.below(PAUSE_MS_MAX);
         thread::sleep(Duration::from_millis(pause_ms));
@@ -156,7 +155,7 @@ impl Soak {
         deck
     }
 
-    /// Some place that is well. One is left alone, so that work goes on.
+    /// A random healthy place. One place is never chosen, so that work continues.
     fn place(&mut self) -> &mut Place {
         if self.places.iter().filter(|place| !place.is_troubled).count() < 2 {
             self.places.iter_mut().for_each(Place::heal);
@@ -179,7 +178,7 @@ impl Soak {
                 if fault == Fault::WorkerKilled {
                     place.worker.process.kill();
                 } else {
-                    // A worker that has not said a word may not listen for signals yet.
+                    // A worker without any output may not listen for signals yet.
                     place.worker.process.wait_for("sign of life", |_| true);
                     place.worker.process.signal("TERM");
                     assert_eq!(place.worker.process.wait().code(), Some(0));
@@ -255,7 +254,7 @@ impl Soak {
     fn kill_referee(&self) -> bool {
         let id = self.coordinator.process.id();
         let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children"));
-        // The thread that started it need not be the first.
+        // The thread that started it may not be the first.
         let threads = fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
         let of_threads = threads.map(|thread| fs::read_to_string(thread.path().join("children")));
         let ids: Vec<String> = of_threads
@@ -269,7 +268,7 @@ impl Soak {
         })
     }
 
-    /// Checks the experiment if it has ended, and starts it anew.
+    /// Checks the experiment if it has ended, and submits it again.
     fn keep_busy(&mut self) {
         let n_running: u64 = self
             .coordinator
@@ -287,8 +286,7 @@ impl Soak {
     }
 }
 
-/// A worker that is in the way: it lies, as no other does, says that items fail, or says
-/// nothing.
+/// A bad worker: it lies with values of its own, reports that items fail, or answers nothing.
 async fn intrude(url: String, name: String, fault: Fault, salt: u64) {
     let hello = Hello { name, slots: 2, ..hello() };
     loop {
@@ -330,7 +328,7 @@ fn setting<T: FromStr>(name: &str) -> Option<T> {
     Some(text.parse().unwrap_or_else(|_| panic!("{name} is {text}, not a number")))
 }
 
-/// Says something past the capture of a test's output.
+/// Prints a line that bypasses the capture of a test's output.
 fn say(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }
@@ -348,7 +346,7 @@ fn any_mix_of_faults_comes_to_the_undisturbed_digest() {
     while !is_over {
         for fault in soak.deck() {
             soak.strike(fault);
-            // Every kind of fault is to happen at least once.
+            // Every kind of fault should happen at least once.
             let n_kinds = soak.faults.values().filter(|&&n| n > 0).count();
             is_over = started.elapsed() > Duration::from_secs(seconds) && n_kinds == FAULTS.len();
             if is_over {

@@ -1,7 +1,7 @@
-//! What the fleet makes of a second core: generations of experiment A by two
-//! worker processes with a slot each, through gRPC and the database, beside the
-//! same number of episodes in one thread of one process; and how much memory a
-//! worker takes. The two sides take turns; figures are medians.
+//! Measures the speedup from a second core: generations of experiment A by two worker processes
+//! with a slot each, through gRPC and the database, against the same number of episodes in one
+//! thread of one process. Also measures the memory of a worker. The two sides take turns; figures
+//! are medians.
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures time")]
 
 use std::{
@@ -16,7 +16,7 @@ use serde_json::json;
 use sim_core::Simulation;
 
 const N_ROUNDS: usize = 5;
-/// The first generation of a round sets up, the others are timed.
+/// Number of timed generations per round, after a first one for the setup.
 const N_TIMED_GENERATIONS: u64 = 6;
 
 fn main() {
@@ -33,7 +33,7 @@ fn main() {
             let file = file.edit(|file| {
                 file["seed"] = json!(seed);
                 file["algorithm"]["generations"] = json!(N_TIMED_GENERATIONS + 1);
-                // Re-evaluations and judgements of champions are not what is measured.
+                // Without re-evaluations and judgements of champions, which are not measured.
                 file["algorithm"]["champion_every"] = json!(1000);
                 file["algorithm"]["champion_trials"] = json!(1);
                 file["algorithm"]["judgement_trials"] = json!(1);

@@ -1,8 +1,8 @@
-//! What a generation costs beside its episodes, with real processes: a coordinator and
-//! two workers of one slot. Genotypes are those of experiment A, episodes of one robot and
-//! one step, so that next to nothing is simulated. And how near `swarmctl run` comes to
-//! twice one thread with the quickstart, whose episodes are short. Figures are medians of
-//! rounds that take turns; an argument selects lines by a part of their name.
+//! Measures the overhead of a generation, apart from its episodes, with real processes: a
+//! coordinator and two workers of one slot. Genotypes are those of experiment A; episodes have
+//! one robot and one step, so that the simulation costs next to nothing. Also compares `swarmctl
+//! run` on two cores with one thread, for the quickstart, whose episodes are short. Figures are
+//! medians of rounds that take turns; an argument selects lines by a part of their name.
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures time")]
 
 use std::{
@@ -53,7 +53,7 @@ fn main() {
     table.print();
 }
 
-/// Lines with their values of all rounds, in the order in which they came.
+/// Lines with their values of all rounds, in the order of measurement.
 #[derive(Default)]
 struct Table(Vec<(String, Vec<f64>)>);
 
@@ -94,7 +94,7 @@ fn quickstart() -> Experiment {
     shipped("quickstart").edit(|file| without_reevaluation(&mut file["algorithm"]))
 }
 
-/// Re-evaluations of champions are not what is measured.
+/// Removes re-evaluations of champions, which are not measured.
 fn without_reevaluation(algorithm: &mut Value) {
     algorithm["champion_every"] = json!(100_000);
     algorithm["champion_trials"] = json!(1);
@@ -119,7 +119,7 @@ struct Run {
 impl Run {
     /// The first `n_warm_up` generations are not timed.
     fn of_fleet(file: &Experiment, n_warm_up: u64) -> Self {
-        // As it is run by default: the harness has it log more.
+        // The default level; the harness logs more.
         let coordinator = CoordinatorProcess::start_with(&["--log-level", "info"]);
         let workers = WorkerProcess::start_many(&coordinator, 2);
         let id = coordinator.submit(&file.path());
@@ -135,8 +135,8 @@ impl Run {
     }
 }
 
-/// Between the commits of generations, the last one left out: a champion is chosen before
-/// it.
+/// Time between the commits of generations, except the last one, before which a champion is
+/// chosen.
 fn ms_per_generation(database: &Connection, n_warm_up: u64) -> f64 {
     let sql = "SELECT (max(at_ms) - min(at_ms)) * 1.0 / (count(*) - 1) FROM events
                WHERE kind = 'generation' AND generation >= ?1

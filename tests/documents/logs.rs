@@ -1,10 +1,10 @@
-//! The page on logs knows every line that the programs write at INFO and above.
+//! The page on logs lists every line that the programs write at INFO and above.
 
 use std::{collections::BTreeSet, fs, path::Path};
 
 use harness::workspace_file;
 
-/// What stands for the parts of a message that vary.
+/// The sign for the varying parts of a message.
 const VARYING: &str = "…";
 
 /// A line, as the page writes it: message, level, fields.
@@ -28,7 +28,7 @@ fn collect(path: &Path, lines: &mut BTreeSet<Line>) {
         return;
     }
     let name = path.file_name().unwrap().to_str().unwrap();
-    // Tests, and what only tests of a debug build see.
+    // Skips tests, and lines that only tests of a debug build see.
     if !name.ends_with(".rs") || name == "tests.rs" || name == "failpoint.rs" {
         return;
     }
@@ -67,7 +67,7 @@ fn arguments(code: &str) -> Vec<String> {
     arguments
 }
 
-/// Fields come before the message, and what fills the message comes after it.
+/// Fields come before the message, and its format arguments after it.
 fn line(level: &str, arguments: Vec<String>) -> Line {
     let mut fields = Vec::new();
     for argument in arguments {
@@ -82,7 +82,7 @@ fn line(level: &str, arguments: Vec<String>) -> Line {
     panic!("a line without a message: {fields:?}");
 }
 
-/// A message as it is written, with a sign for each part that varies.
+/// A message with a sign for each varying part.
 fn message(literal: &str) -> String {
     let unescaped = literal.replace("\\\"", "\"");
     let mut pieces = unescaped.split("\\\n");

@@ -1,4 +1,4 @@
-//! What documents and manifests state agrees with the sources, and with what programs print.
+//! Documents and manifests agree with the sources, and with the output of the programs.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod logs;

@@ -22,7 +22,7 @@ fn missing(path: &Path, found: &mut usize) -> Vec<String> {
         let sources = names.filter(|path| !path.ends_with("target"));
         return sources.flat_map(|path| missing(&path, found)).collect();
     }
-    // What is no text names no page.
+    // Binary files name no pages.
     let pages = fs::read_to_string(path).map(|text| pages_in(&text)).unwrap_or_default();
     *found += pages.len();
     let absent = pages.into_iter().filter(|page| !workspace_file(page).exists());

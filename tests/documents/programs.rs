@@ -1,4 +1,4 @@
-//! The page on `coordinator` and `worker` has what they print themselves.
+//! The page on `coordinator` and `worker` has their own help texts.
 
 use std::{env, fmt::Write, fs, process::Command};
 
@@ -13,7 +13,7 @@ fn the_page_on_programs_has_their_help() {
          `UPDATE_DOCS=1 cargo test -p fleet-tests\n--test documents programs::` writes it.\n",
     );
     for program in ["coordinator", "worker"] {
-        // No variable of this shell is shown as the default of an option.
+        // Without the variables of this shell, which would appear as defaults of options.
         let output = Command::new(binary(program))
             .arg("--help")
             .env_clear()

@@ -1,4 +1,4 @@
-//! Where Cargo is told not to look for tests, which saves compile time, there are none.
+//! Targets that Cargo does not search for tests, to save compile time, have none.
 
 use std::fs;
 

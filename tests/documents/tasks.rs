@@ -1,4 +1,4 @@
-//! `docs/tasks.md` has every name that a script can see.
+//! `docs/tasks.md` has every name that a script can use.
 
 use std::fs;
 

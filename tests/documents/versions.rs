@@ -1,10 +1,10 @@
-//! One version of Rust is named everywhere: the one that CI compiles with.
+//! All files name the same version of Rust, with which CI compiles.
 
 use std::fs;
 
 use harness::workspace_file;
 
-/// What is between two texts in a file of the workspace; the first occurrence.
+/// The text between two texts in a file of the workspace, at the first occurrence.
 fn between(path: &str, before: &str, after: &str) -> String {
     let text = fs::read_to_string(workspace_file(path)).unwrap();
     let rest = text.split_once(before).unwrap_or_else(|| panic!("{path}: no `{before}`")).1;

@@ -1,15 +1,14 @@
-//! What pages show is what the programs print.
+//! The outputs on pages are those of the programs.
 //!
-//! A walk goes through the blocks of a page from top to bottom, in a directory of its own.
-//! A block marked `console` holds commands, each after `$ `, and below each its output: all of
-//! standard output, and of standard error whatever helps the reader. A line `...` stands for
+//! A walk goes through the blocks of a page from top to bottom, in a directory of its own. A
+//! block marked `console` has commands, each after `$ `, and below each its output: all of
+//! standard output, and the lines of standard error that help the reader. A line `...` stands for
 //! any lines. A block with `title="NAME"` is written to that file. Other blocks are not run.
-//! Equal means equal to the last digit, except for times, speeds, dates, ports, and the size
-//! and digest of archives, which contain times. The version of the database's schema may
-//! differ, too.
+//! Equal means equal to the last digit, except for times, speeds, dates, ports, and the size and
+//! digest of archives, which contain times. The version of the database's schema may differ, too.
 //!
-//! `UPDATE_DOCS=1 cargo test -p fleet-tests --test documents walks` writes the output of
-//! today into the pages: read the difference before you commit it.
+//! `UPDATE_DOCS=1 cargo test -p fleet-tests --test documents walks` writes the present output
+//! into the pages: read the difference before you commit it.
 
 use std::{
     env, fs,
@@ -86,7 +85,7 @@ fn steps(lines: &[String], mut at: usize) -> Vec<Step> {
     steps
 }
 
-/// Makes texts equal that differ in what no two runs have in common.
+/// Replaces the parts of texts that differ between any two runs.
 struct Normaliser(Vec<(Regex, &'static str)>);
 
 impl Normaliser {
@@ -98,10 +97,10 @@ impl Normaliser {
             (r"\b\d+ bytes, SHA-256 [0-9a-f]{64}", "SHA-256"),
             (r"SHA-256 [0-9a-f]{64}", "SHA-256"),
             (r"schema version \d+", "schema"),
-            // Said only while there is much to come.
+            // Printed only while much work remains.
             (r" +ETA \d\d:\d\d:\d\d", ""),
             (r"127\.0\.0\.1:\d+", "ADDRESS"),
-            // The rules and the columns of tables are as wide as the widest time.
+            // The widths of rules and columns depend on the widest time.
             (r"[ \t]+", " "),
             ("─+", "─"),
         ];
@@ -116,8 +115,8 @@ impl Normaliser {
         line
     }
 
-    /// Whether lines of a page are all of an output, and some or none of the remarks beside it,
-    /// each in their order.
+    /// Whether lines of a page consist of the whole output, and some or none of the remarks, each
+    /// in order.
     fn agree(&self, shown: &[String], output: &[String], remarks: &[String]) -> bool {
         let Some((line, rest)) = shown.split_first() else { return output.is_empty() };
         if line.trim() == ANY_LINES {
@@ -133,8 +132,7 @@ impl Normaliser {
     }
 }
 
-/// An output in the form that the page had: with as many lines before and after those that
-/// `...` stands for.
+/// An output in the form of the page: with as many lines before and after `...`.
 fn abridged(shown: &[String], output: Vec<String>) -> Vec<String> {
     let is_any = |line: &String| line.trim() == ANY_LINES;
     let Some(before) = shown.iter().position(is_any) else { return output };
@@ -146,7 +144,7 @@ fn abridged(shown: &[String], output: Vec<String>) -> Vec<String> {
     [first, &[ANY_LINES.to_owned()], last].concat()
 }
 
-/// The directory of a walk, and what its commands find there.
+/// The directory of a walk, and the environment of its commands.
 struct Walk {
     directory: TempDir,
 }
@@ -164,8 +162,8 @@ impl Walk {
         fs::write(self.directory.path().join(name), text).unwrap();
     }
 
-    /// Runs a command as a shell would, with the programs of this build and no settings of
-    /// whoever runs the test.
+    /// Runs a command as a shell would, with the programs of this build and without the settings
+    /// of the person who runs the test.
     fn run(&self, command: &str) -> Outcome {
         let programs = binary("swarmctl");
         let programs = programs.parent().expect("a directory");
@@ -182,14 +180,14 @@ impl Walk {
             .current_dir(self.directory.path())
             .env("PATH", env::join_paths(paths).unwrap())
             .env("XDG_CONFIG_HOME", self.directory.path())
-            // Not a coordinator that happens to run on this machine.
+            // Keeps commands from reaching a coordinator that happens to run on this machine.
             .env("SWARM_DATA_DIR", "./swarm-data");
         Outcome::of_command(&mut shell)
     }
 }
 
-/// Runs the commands of a page. Returns what is not as the page shows it, or, with
-/// `UPDATE_DOCS`, writes it there.
+/// Runs the commands of a page. Returns the differences from the page, or, with `UPDATE_DOCS`,
+/// writes the outputs to the page.
 fn walk(page: &Path) -> Vec<String> {
     let text = fs::read_to_string(page).unwrap();
     let lines: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -198,7 +196,7 @@ fn walk(page: &Path) -> Vec<String> {
     let mut updated = lines.clone();
     let parts = parts(&lines);
     assert!(parts.iter().any(|part| matches!(part, Part::Step(_))), "{}", page.display());
-    // How many lines the page has gained so far.
+    // Number of lines that the page has gained so far.
     let mut shift = 0_isize;
     for part in parts {
         let Step { command, output: place } = match part {

@@ -1,4 +1,4 @@
-//! What large requests may take of the coordinator, and that it lives on.
+//! Large requests: their memory in the coordinator is bounded, and it survives.
 #![allow(clippy::needless_update, reason = "messages get more fields as the protocol grows")]
 
 use std::fs;
@@ -13,7 +13,7 @@ use swarm_proto::v1::{
 use tokio::task::JoinSet;
 use tonic::{Code, Response, Status, Streaming, transport::Channel};
 
-/// An experiment of so many individuals with 440 genes each.
+/// An experiment of `population_size` individuals with 440 genes each.
 fn large(population_size: u64) -> Experiment {
     let text = fs::read_to_string(workspace_file("configs/quickstart.json")).unwrap();
     let mut value: Value = serde_json::from_str(&text).unwrap();
@@ -138,7 +138,7 @@ async fn evaluations_that_wait_take_no_more_memory_than_they_may() {
     assert!(text.contains("256 MiB") && text.contains("try again"), "{text}");
     let memory = coordinator.process.memory_mib();
     assert!(memory < 450, "{memory} MiB");
-    // The others' room is free once they have gone.
+    // The room of the other clients is free once they have gone.
     waiting.clear();
     coordinator
         .process
@@ -148,10 +148,10 @@ async fn evaluations_that_wait_take_no_more_memory_than_they_may() {
     }
 }
 
-/// MiB that the coordinator of a debug build takes beside what is counted.
+/// Memory of a debug build's coordinator outside the counted budgets, MiB.
 const PROGRAM_MIB: u64 = 150;
 
-/// Sends the same evaluation on connections of their own, all at once, and holds the answers.
+/// Sends the same evaluation on separate connections at the same time, and holds the answers.
 async fn evaluate_at_once(
     coordinator: &CoordinatorProcess,
     n_clients: usize,
@@ -183,7 +183,7 @@ async fn a_hundred_evaluations_at_once_stay_within_what_is_stated() {
     for status in &refused {
         assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
     }
-    // What waits to be evaluated, and what is on its way in.
+    // The waiting evaluations, and the incoming messages.
     let peak = coordinator.process.peak_memory_mib();
     assert!(peak < 256 + 128 + PROGRAM_MIB, "{peak} MiB");
 }
@@ -198,7 +198,7 @@ async fn workers_that_do_not_read_take_no_more_memory_than_is_stated() {
     }
     let (waiting, _) = evaluate_at_once(&coordinator, 40).await;
     assert!(waiting.len() >= 30, "{} of 7 MB each", waiting.len());
-    // An evaluation goes to a worker when others have been given theirs.
+    // Each evaluation gets a worker after the others have got theirs.
     coordinator.process.wait_for("the last that is computed", |line| {
         line["message"] == "items assigned" && line["job"] == "evaluation 16"
     });

@@ -95,7 +95,7 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
     export(&elsewhere, 1, &again);
     assert_eq!(fs::read(&again).unwrap(), fs::read(&file).unwrap());
 
-    // It is continued there, as if it had been computed there.
+    // It continues there, as if it had been computed there.
     let _workers = WorkerProcess::start_many(&elsewhere, 2);
     elsewhere.swarmctl(&["fork", "1@1", "--seed", "99", "--generations", "3"]).expect_success();
     let [digest, expected] = [(&elsewhere, 3), (&here, 2)]
@@ -110,7 +110,7 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
     refused(&here.swarmctl(&["export", "1", "--to", "x.zip"]), 3, "was pruned before generation 4");
 }
 
-/// Whatever is no bundle changes nothing.
+/// Files that are not bundles change nothing.
 fn hostile(coordinator: &CoordinatorProcess, bundle: &Path) {
     let bytes = fs::read(bundle).unwrap();
     let path = bundle.with_file_name("bad.zip");
@@ -132,7 +132,7 @@ fn hostile(coordinator: &CoordinatorProcess, bundle: &Path) {
     assert_eq!(listed.as_array().unwrap().len(), 3, "nothing was created");
 }
 
-/// Prints what an independent reader of RO-Crates finds in a bundle.
+/// Prints a bundle as an independent reader of RO-Crates sees it.
 const READ_CRATE: &str = "\
 import json, os, sys
 from rocrate.rocrate import ROCrate
@@ -152,7 +152,7 @@ print(json.dumps({
 }))
 ";
 
-/// Prints the scalars that TensorBoard's own reader finds in a directory.
+/// Prints the scalars of a directory as TensorBoard's own reader sees them.
 const READ_EVENTS: &str = "\
 import json, sys
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator

@@ -1,4 +1,4 @@
-//! What people see: results, errors that say what to do, exit codes.
+//! The command line for people: results, errors with the next step, exit codes.
 
 use std::{
     fs,

@@ -1,5 +1,4 @@
-//! A directory in which somebody has worked: a run in `swarm-data`, its experiment file and its
-//! history.
+//! A used directory: a run in `swarm-data`, its experiment file and its history.
 
 use std::{fs, path::Path, process::Command};
 
@@ -9,7 +8,8 @@ use harness::{Experiment, Outcome, binary};
 pub struct DataDirectory(tempfile::TempDir);
 
 impl DataDirectory {
-    /// With `experiment.json`, of two generations, which has run as experiment 1, and `history.csv`.
+    /// Creates it, with `experiment.json` of two generations, which has run as experiment 1, and
+    /// `history.csv`.
     pub fn new() -> Self {
         let this = Self(tempfile::tempdir().unwrap());
         let experiment = Experiment::tiny(2);

@@ -1,4 +1,4 @@
-//! Evaluations: the same files whoever computes them, and whatever happens meanwhile.
+//! Evaluations write the same files on any fleet, with any faults.
 
 use std::{collections::BTreeMap, fs, path::Path, process::Command, thread, time::Duration};
 
@@ -51,7 +51,7 @@ impl Subject {
         args
     }
 
-    /// What has been written.
+    /// The written files.
     fn files(&self, to: &str) -> BTreeMap<&'static str, String> {
         let read = |name| (name, fs::read_to_string(self.directory.path().join(to).join(name)));
         FILES.into_iter().map(read).map(|(name, text)| (name, text.unwrap())).collect()
@@ -125,7 +125,7 @@ fn a_coordinator_that_is_killed_is_asked_again() {
     thread::scope(|scope| {
         let args = ["--coordinator", &url].into_iter().map(str::to_owned).chain(args);
         let evaluating = scope.spawn(|| swarmctl(args).expect_success());
-        // There is no worker, so it cannot be done.
+        // Without a worker, the evaluation cannot finish.
         coordinator.process.wait_for("evaluation", |line| line["message"] == "evaluation starts");
         coordinator.process.kill();
         coordinator.restart();
@@ -323,7 +323,7 @@ async fn the_work_of_a_client_that_goes_away_is_dropped() {
     }
 }
 
-/// What people read.
+/// The text output, for people.
 fn shown(coordinator: &CoordinatorProcess, command: &str) -> Outcome {
     let mut process = Command::new(binary("swarmctl"));
     process.args([command, "--coordinator", &coordinator.url()]);
@@ -332,7 +332,7 @@ fn shown(coordinator: &CoordinatorProcess, command: &str) -> Outcome {
 
 #[test]
 fn an_evaluation_that_waits_for_a_worker_is_seen_by_everybody() {
-    /// Only a coordinator that hangs is asked so often.
+    /// Limit of questions, which only a hanging coordinator reaches.
     const N_QUESTIONS_MAX: usize = 600;
     let subject = Subject::new();
     let coordinator = CoordinatorProcess::start();

@@ -1,8 +1,8 @@
-//! `swarmctl explain` in the situations that it knows: what it advises is done, word by
-//! word, and the experiment goes on.
+//! `swarmctl explain` in all situations that it knows: the test follows its advice word by word,
+//! and the experiment continues.
 //!
-//! Others are where they are caused: a full disk in `faults::disk`, too little memory in
-//! `budgets`.
+//! Other situations are tested beside their causes: a full disk in `faults::disk`, too little
+//! memory in `budgets`.
 
 use std::{
     collections::BTreeSet,
@@ -22,7 +22,7 @@ use harness::{
 use serde_json::Value;
 use swarm_proto::v1::{Hello, ItemFailure, item_result, work_response};
 
-/// Only a coordinator that hangs is asked so often.
+/// Limit of questions, which only a hanging coordinator reaches.
 const N_QUESTIONS_MAX: usize = 600;
 /// Time between two questions.
 const PERIOD: Duration = Duration::from_millis(100);
@@ -41,7 +41,7 @@ fn assert_undisturbed(coordinator: &CoordinatorProcess, id: u64) {
     assert_eq!(coordinator.watch(id).finish().digests(), *expected);
 }
 
-/// What `swarmctl explain` finds.
+/// The findings of `swarmctl explain`.
 fn findings(coordinator: &CoordinatorProcess, id: u64) -> Vec<Value> {
     let explanation = coordinator.swarmctl(&["explain", &id.to_string()]).expect_success().json();
     explanation["findings"].as_array().unwrap().clone()
@@ -83,7 +83,7 @@ fn step(finding: &Value, index: usize) -> &str {
     finding["next_steps"][index].as_str().unwrap_or_else(|| panic!("no step {index}: {finding:#}"))
 }
 
-/// The command of a step, as somebody types it who has set the coordinator's address.
+/// The command of a step, as a user types it after setting the coordinator's address.
 fn typed(coordinator: &CoordinatorProcess, step: &str) -> Command {
     let (_, command) = step.split_once(": ").unwrap();
     let programs = binary("swarmctl").parent().unwrap().to_owned();
@@ -100,7 +100,7 @@ fn carry_out(coordinator: &CoordinatorProcess, step: &str) -> Outcome {
     Outcome::of_command(&mut typed(coordinator, step)).expect_success()
 }
 
-/// A worker that was started because a step says so.
+/// A worker that was started on the advice of a step.
 struct AdvisedWorker(Child);
 
 impl AdvisedWorker {
@@ -122,7 +122,7 @@ async fn connect(coordinator: &CoordinatorProcess, name: &str) -> HandWorker {
     HandWorker::connect(&coordinator.url(), hello).await.unwrap()
 }
 
-/// Reports that the first item of a worker fails, which is not true.
+/// Falsely reports that the first item of a worker fails.
 async fn fail(worker: &mut HandWorker) {
     let assignments = worker.receive_assignments().await.unwrap().assignments;
     let failure = ItemFailure { message: "the wheels came off".to_owned() };
@@ -179,7 +179,7 @@ fn every_command_for_an_experiment_that_waits_is_paused_or_has_ended_can_be_give
 async fn workers_in_quarantine_are_let_in_again_by_the_commands_that_are_advised() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
-    // A shell would take them apart.
+    // A shell would split these arguments.
     let names = ["lab 2's", "$(false)"];
     for name in names {
         let mut worker = connect(&coordinator, name).await;
@@ -187,7 +187,7 @@ async fn workers_in_quarantine_are_let_in_again_by_the_commands_that_are_advised
         wait_for_proof(&coordinator, name);
         worker.hang_up().await;
     }
-    // Their machines are mended.
+    // Their machines are repaired.
     let _mended = names.map(|name| WorkerProcess::start(&coordinator, name));
     wait_for_finding(&coordinator, id, "quarantine", "2 workers");
     let available = wait_for_finding(&coordinator, id, "no_workers_available", "none of 2");
@@ -272,7 +272,7 @@ async fn what_the_referee_is_asked_is_shown_and_needs_no_help() {
     let mut broken = connect(&coordinator, "broken-1").await;
     fail(&mut broken).await;
     wait_for_proof(&coordinator, "broken-1");
-    // Slow from here on.
+    // The worker is slow from here on.
     let referee = referee_of(&coordinator);
     send_signal("-STOP", referee);
     let mut broken = connect(&coordinator, "broken-2").await;
@@ -282,7 +282,7 @@ async fn what_the_referee_is_asked_is_shown_and_needs_no_help() {
     assert!(asked["next_steps"].as_array().unwrap().is_empty(), "{asked:#}");
     let said = "broken-2: one of its results is in doubt until the referee has answered";
     wait_for_finding(&coordinator, id, "workers_waiting", said);
-    // Nobody is left, so more workers are asked for.
+    // No worker is left, so `explain` advises to start more.
     let available = wait_for_finding(&coordinator, id, "no_workers_available", "");
     let _worker = AdvisedWorker::start(&coordinator, step(&available, 1));
     wait_for_end_of_finding(&coordinator, id, "no_workers_available");
@@ -309,7 +309,7 @@ async fn a_referee_that_cannot_be_started_is_asked_again_when_the_coordinator_ha
     let entries = fs::read_dir(format!("/proc/{process}/fd")).unwrap().flatten();
     let open: BTreeSet<u32> =
         entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
-    // Room for a client or two, and not for the pipes of another process.
+    // Enough for one or two clients, but not for the pipes of another process.
     let room = (0..).filter(|n| !open.contains(n)).nth(4).unwrap();
     limit_open_files(process, room);
     fail(&mut broken).await;

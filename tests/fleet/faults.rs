@@ -1,9 +1,9 @@
-//! Faults cost time, and not a bit of the result.
+//! Faults cost time, but change no bit of the result.
 //!
 //! Every test asserts that its fault has happened, and that the digests of all
 //! generations and of the champion equal those of an undisturbed run.
 
-// They need failpoints, which optimised programs do not have.
+// These tests need failpoints, which optimised programs lack.
 #[cfg(debug_assertions)]
 mod commits;
 mod coordinator;
@@ -20,23 +20,23 @@ use std::sync::OnceLock;
 
 use harness::{CoordinatorProcess, Experiment, LogLine, Watch, undisturbed};
 
-/// Generations of the experiments here.
+/// Number of generations of the experiments here.
 const GENERATIONS: u64 = 6;
 
-/// A generation takes tens of milliseconds: time to hit it.
+/// A generation takes tens of milliseconds, enough time for a fault.
 static SMALL: Subject = Subject::new(|| Experiment::small(GENERATIONS));
-/// Two workers of one slot each are given its items in several portions.
+/// Two workers of one slot each get its items in several portions.
 static MANY: Subject = Subject::new(|| {
     Experiment::small(GENERATIONS).edit(|e| e["algorithm"]["population_size"] = 60.into())
 });
-/// For faults that need no time to hit.
+/// For faults that need no time.
 static TINY: Subject = Subject::new(|| Experiment::tiny(GENERATIONS));
 
-/// An experiment beside another.
+/// A second experiment, beside another one.
 static OTHER: Subject =
     Subject::new(|| Experiment::tiny(GENERATIONS).edit(|e| e["seed"] = 8.into()));
 
-/// An experiment and what it comes to.
+/// An experiment and its digests.
 struct Subject {
     make: fn() -> Experiment,
     undisturbed: OnceLock<Vec<String>>,
@@ -61,8 +61,8 @@ impl Subject {
     }
 }
 
-/// Waits until some worker has been given items of a generation; returns the
-/// line and the number of lines of the coordinator's log up to there.
+/// Waits until a worker has got items of a generation; returns the line, and the number of lines
+/// of the coordinator's log up to it.
 fn wait_for_assignment(coordinator: &CoordinatorProcess, generation: u64) -> (usize, LogLine) {
     coordinator.process.find(0, "assignment", |line| {
         line["message"] == "items assigned" && line["generation"] == generation
@@ -79,7 +79,7 @@ fn n_lost(coordinator: &CoordinatorProcess) -> usize {
     coordinator.process.lines().iter().filter(|line| line["message"] == "worker lost").count()
 }
 
-/// The generation at which a restarted coordinator went on.
+/// The generation at which a restarted coordinator continued.
 fn resumed_at(coordinator: &CoordinatorProcess) -> u64 {
     let line = coordinator
         .process

@@ -1,5 +1,5 @@
-//! Files of every kind, given to every command that takes a file: it takes them, or says in one
-//! line what they are and what to do with them.
+//! Files of every kind, given to every command that takes a file. The command accepts the file,
+//! or names its kind and the right command in one line.
 
 use std::fs;
 
@@ -32,7 +32,7 @@ const TAKERS: [(&str, &[&str]); 17] = [
     ("doctor --data-dir @", &["swarm-data"]),
 ];
 
-/// A file, and what it is said to be.
+/// A file, and its kind in the error.
 const FILES: [(&str, &str); 16] = [
     ("experiment.json", "an experiment file"),
     ("champion.json", "a champion file"),
@@ -52,7 +52,7 @@ const FILES: [(&str, &str); 16] = [
     ("replay.html", "a page for a browser"),
 ];
 
-/// With a file of each kind.
+/// A directory with a file of each kind.
 fn directory() -> DataDirectory {
     let directory = DataDirectory::new();
     let path = |name: &str| directory.path().join(name);
@@ -84,7 +84,7 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
     let mut problems = Vec::new();
     for (command, taken) in TAKERS {
         for (file, kind) in FILES {
-            // Its name has to say the seed.
+            // Its name must contain the seed.
             if (command, file) == ("compare @", "history.csv") {
                 continue;
             }
@@ -93,7 +93,7 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
             let outcome = directory.swarmctl(&format!("{line}{forced}"));
             let is_taken = taken.contains(&file);
             let said = outcome.stderr.lines().next().unwrap_or_default();
-            // A word without an ending may be the name of an experiment.
+            // A word without a suffix may be the name of an experiment.
             let is_word =
                 outcome.code == Some(3) && said.contains(&format!("`{file}` is {kind}; "));
             let is_refused = outcome.code == Some(2)

@@ -1,4 +1,4 @@
-//! Experiments that go on from the state of another one.
+//! Experiments that continue the state of another one.
 
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, swarmctl};
 use serde_json::Value;
@@ -20,7 +20,7 @@ fn a_fork_shares_the_past_of_its_parent_and_its_future_if_nothing_is_changed() {
     let of_parent = coordinator.watch(parent).finish();
     drop(workers);
 
-    // Stopped before their first own generations, they continue.
+    // Forks that were stopped before their first own generation continue.
     let same = fork(&coordinator, &["1@2", "--name", "the same"]);
     assert_eq!(
         same["forked_from"]["changes"][0],
@@ -45,7 +45,7 @@ fn a_fork_shares_the_past_of_its_parent_and_its_future_if_nothing_is_changed() {
         assert_ne!(found[3], expected[3]);
     }
 
-    // The same state: whatever the swarm, the same genotypes are drawn from it.
+    // The state is the same, so the genotypes are the same with any swarm.
     let genotypes = |address: &str| {
         let population = coordinator.swarmctl(&["individual", address]).expect_success().json();
         let individuals = population["individuals"].as_array().unwrap().clone();

@@ -41,7 +41,7 @@ fn runs_of_a_group_share_the_fleet_and_have_the_bits_of_runs_alone() {
     }
     assert_eq!(runs.values().map(Vec::len).collect::<Vec<_>>(), [4; 4]);
     let at_ms = |generation: &Value| generation["completed_at_ms"].as_u64().unwrap();
-    // Those that were submitted at once: the others may come when these have ended.
+    // The ones submitted at once; the others may follow after these have ended.
     let at_once = ids.map(|id| &runs[&id.as_u64().unwrap()]);
     let last_to_begin = at_once.iter().map(|run| at_ms(run[0])).max().unwrap();
     let first_to_end = at_once.iter().map(|run| at_ms(run[3])).min().unwrap();

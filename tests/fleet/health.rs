@@ -5,7 +5,7 @@ use std::{path::Path, process::Command};
 use harness::{CoordinatorProcess, Outcome, WorkerProcess, binary};
 use tempfile::tempdir;
 
-/// Its one line, if this is its exit code.
+/// The one line of output; asserts this exit code.
 fn line(program: &str, args: &[&str], code: i32) -> String {
     let outcome =
         Outcome::of_command(Command::new(binary(program)).arg("--health-check").args(args));

@@ -1,4 +1,4 @@
-//! Everybody who ever lived comes back.
+//! Every individual can be recovered.
 
 use std::{fs, path::Path};
 
@@ -33,7 +33,7 @@ fn bits(values: &Value) -> Vec<u64> {
     values.as_array().unwrap().iter().map(|value| value.as_f64().unwrap().to_bits()).collect()
 }
 
-/// The fitness of an individual when it is simulated again, which needs its very genes.
+/// The fitness of an individual simulated again, which needs exactly its genes.
 fn simulated_again(address: &str, data_dir: &Path) -> Vec<u64> {
     let args = ["simulate", address, "--data-dir", data_dir.to_str().unwrap()];
     let simulation = swarmctl(args).expect_success().json();
@@ -63,7 +63,8 @@ fn individuals_come_back_bit_for_bit_across_kills_from_a_coordinator_and_without
     for id in ids {
         for generation in [0, 3] {
             let whole = format!("{id}@{generation}");
-            // While the coordinator runs, from it and from the file beside it.
+            // While the coordinator runs, the genotypes come from the coordinator and from its
+            // file.
             let population = coordinator.swarmctl(&["individual", &whole]).expect_success().json();
             let read = swarmctl(["individual", &whole, "--data-dir", directory]);
             assert_eq!(read.expect_success().json(), population);
@@ -93,7 +94,7 @@ fn individuals_come_back_bit_for_bit_across_kills_from_a_coordinator_and_without
     prune(&coordinator, ids[0]);
 }
 
-/// What is not there is refused in one line.
+/// Missing individuals are refused in one line.
 fn refusals(coordinator: &CoordinatorProcess, ga: u64) {
     let data_dir = coordinator.data_dir().to_str().unwrap();
     for (place, code, what) in [
@@ -127,7 +128,7 @@ fn refusals(coordinator: &CoordinatorProcess, ga: u64) {
     }
 }
 
-/// Without its log, an experiment keeps its results and can be given more generations.
+/// Without its log, an experiment keeps its results and can be extended.
 fn prune(coordinator: &CoordinatorProcess, id: u64) {
     let number = id.to_string();
     let champion = coordinator.swarmctl(&["individual", &number]).expect_success().stdout;

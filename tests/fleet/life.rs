@@ -1,5 +1,5 @@
-//! Experiments go on after their end, to the bits of one that never ended; and are found,
-//! kept and deleted.
+//! Experiments continue after their end, to the bits of one that never ended. They can be found,
+//! archived and deleted.
 
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, undisturbed};
 use serde_json::Value;
@@ -53,7 +53,7 @@ fn an_experiment_goes_on_after_every_end_to_the_bits_of_one_that_never_ended() {
     assert_eq!(coordinator.watch(id).finish().digests(), expected);
     assert_eq!(ended(&coordinator, "1")["digest"], ended(&coordinator, "2")["digest"]);
 
-    // The file comes back, and gives the same again.
+    // The file is submitted again, and gives the same result.
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("again.json");
     std::fs::write(&file, coordinator.swarmctl(&["get", &number]).expect_success().stdout).unwrap();

@@ -1,4 +1,4 @@
-//! Whom individuals descend from; and experiments that are there already.
+//! Lineages of individuals; and submissions of existing experiments.
 
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, swarmctl};
 use serde_json::{Value, json};

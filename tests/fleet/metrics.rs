@@ -1,4 +1,4 @@
-//! What can be scraped agrees with what the fleet did.
+//! Metrics agree with the work of the fleet.
 
 use std::{process::Command, thread, time::Duration};
 
@@ -21,7 +21,7 @@ fn worker(coordinator: &CoordinatorProcess) -> (WorkerProcess, String) {
     (worker, address)
 }
 
-/// Scrapes until something holds that is about to; panics if that takes two minutes.
+/// Scrapes until a condition holds; panics after two minutes.
 fn scrape_until(address: &str, what: &str, holds: impl Fn(&Samples) -> bool) -> Samples {
     let mut samples = Samples::scrape(address);
     for _ in 0..12_000 {
@@ -150,7 +150,7 @@ fn an_experiment_can_be_seen_while_it_is_unfinished() {
     scrape_until(&address, "gone", |samples| samples.find(completed, &[]).is_none());
 }
 
-/// Of the latest completed generation.
+/// Compares the metrics of the latest completed generation with the database.
 fn agrees_with_the_database(samples: &Samples, coordinator: &CoordinatorProcess, id: u64) {
     let latest = |column: &str| -> f64 {
         let query = format!(

@@ -1,5 +1,5 @@
-//! The page on metrics and the dashboard know the metrics that there are, and a real
-//! Prometheus has something to show in every panel.
+//! The page on metrics and the dashboard use only existing metrics, and a real Prometheus has
+//! data for every panel.
 
 use std::{collections::BTreeSet, env, fs, thread, time::Duration};
 
@@ -132,7 +132,7 @@ fn every_panel_shows_something_to_a_real_prometheus() {
         .flat_map(|(_, expressions)| expressions)
         .map(|expression| expression.replace("$__rate_interval", "1m").replace("$experiment", ".*"))
         .collect();
-    // Two scrapes, a second apart, are enough; who is busy takes longer.
+    // Two scrapes, a second apart, are enough; a busy machine takes longer.
     for _ in 0..240 {
         assert_eq!(coordinator.swarmctl(&["watch", "77"]).code, Some(3));
         expressions.retain(|expression| {

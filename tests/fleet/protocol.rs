@@ -1,4 +1,4 @@
-//! The wire protocol, spoken by hand.
+//! The wire protocol, message by message.
 
 use std::collections::BTreeSet;
 
@@ -51,7 +51,7 @@ async fn a_worker_of_another_version_is_refused_with_both_versions() {
         (other_protocol, "999", PROTOCOL_VERSION.to_string()),
         (other_simulation, "sim-core 999", sim_core::FINGERPRINT.to_owned()),
     ] {
-        // One of its own for each, as lines about refusals are few.
+        // Each case has its own coordinator, because lines about refusals are throttled.
         let coordinator = CoordinatorProcess::start();
         let Err(status) = HandWorker::connect(&coordinator.url(), hello).await else {
             panic!("it was let in")
@@ -132,7 +132,7 @@ async fn reflection_shows_every_service_and_health_says_serving() {
         };
         assert!(!files.file_descriptor_proto.is_empty(), "{service}");
     }
-    // Older tools ask in the older way.
+    // Older tools use the older service.
     let question = v1alpha::ServerReflectionRequest {
         message_request: Some(v1alpha::server_reflection_request::MessageRequest::ListServices(
             String::new(),
@@ -149,7 +149,7 @@ async fn reflection_shows_every_service_and_health_says_serving() {
     assert!(format!("{answer:?}").contains(services[0]), "{answer:?}");
 
     let mut health = HealthClient::new(channel);
-    // The last one is the server as a whole.
+    // The last service is the server as a whole.
     for service in services.iter().take(3).chain(&[""]) {
         let request = HealthCheckRequest { service: (*service).to_owned() };
         let status = health.check(request).await.unwrap().into_inner().status();
@@ -214,7 +214,7 @@ async fn a_silent_worker_loses_its_items_and_its_stream() {
     assert_eq!(worker.receive().await.unwrap_err().code(), Code::Aborted);
 }
 
-/// Copies experiment 1 of a coordinator to the numbers up to this one. `state`: that of each.
+/// Copies experiment 1 of a coordinator to all numbers up to `last`. `state`: of each copy.
 fn copy_to(coordinator: &CoordinatorProcess, last: u64, state: impl Fn(u64) -> &'static str) {
     let columns =
         "id, name, config, config_digest, fingerprint, genotype_len, state, submitted_at_ms";

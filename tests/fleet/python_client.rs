@@ -8,8 +8,8 @@ use serde_json::json;
 const CLIENT_TOKEN: &str = "client-token-0123456789abcdef0123";
 const WORKER_TOKEN: &str = "worker-token-0123456789abcdef0123";
 
-/// Every generation was printed once, in order, with the digests of an undisturbed
-/// run, and so was the digest of everything.
+/// Asserts that every generation was printed once, in order, with the digests of an undisturbed
+/// run, and the digest of everything.
 fn assert_undisturbed(outcome: &Outcome, digests: &[String]) {
     assert_eq!(outcome.code, Some(0), "{outcome:#?}");
     let (last, generations) = digests.split_last().unwrap();
@@ -40,7 +40,7 @@ fn a_python_script_submits_and_follows_to_the_undisturbed_digest() {
     assert_undisturbed(&python.run(&args), &digests);
     // The same request id: the same experiment, shown again.
     assert_undisturbed(&python.run(&args), &digests);
-    // What the script changes in the file.
+    // The changes that the script makes in the file.
     let args = [&args[..3], &["--seed", "8", "--generations", "2"]].concat();
     let changed = python.run(&args);
     assert_eq!(changed.code, Some(0), "{changed:#?}");
@@ -136,7 +136,7 @@ fn a_python_script_needs_the_token_and_says_who_is_not_there() {
     let outcome = python.run(&with_token);
     assert_eq!(outcome.code, Some(4), "{outcome:#?}");
     assert!(outcome.stderr.contains(coordinator.address()), "{}", outcome.stderr);
-    // Elsewhere, and not encrypted: the token stays here.
+    // On another machine without encryption, the script does not send the token.
     let outcome = python.run(&[&with_token[..], &["--coordinator", "http://192.0.2.1:1"]].concat());
     assert_eq!(outcome.code, Some(2), "{outcome:#?}");
     assert!(outcome.stderr.contains("unencrypted"), "{}", outcome.stderr);

@@ -1,5 +1,5 @@
-//! What `swarmctl` reads out of a fleet: history, events, how experiments end, and
-//! why nothing happens.
+//! The data that `swarmctl` reads from a fleet: history, events, ends of experiments, and
+//! explanations.
 
 use harness::{CoordinatorProcess, Experiment, WorkerProcess};
 use serde_json::Value;

@@ -1,5 +1,5 @@
-//! What is in `results/` is what this program computes: whoever repeats a run gets
-//! its bits. The whole of it takes hours; its beginning and its champion do not.
+//! This program reproduces the runs in `results/` bit for bit. The tests repeat the beginning and
+//! the champion of each run; whole runs take hours.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -15,9 +15,9 @@ use harness::{Outcome, binary, skipped_for_want_of, swarmctl, workspace_file};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Generations of each run that are computed again: `SWARM_TEST_GENERATIONS`, of which `.ci/run`
-/// takes 3. Without it, one of one run by each algorithm, and as many evaluations as show each task
-/// and each kind of neurons.
+/// Number of generations of each run to repeat: `SWARM_TEST_GENERATIONS`; `.ci/run` sets 3.
+/// Without it, the tests repeat one generation of one run by each algorithm, and enough
+/// evaluations to cover each task and each kind of neurons.
 fn n_generations() -> Option<usize> {
     let text = env::var("SWARM_TEST_GENERATIONS").ok()?;
     let n = text.parse();
@@ -26,7 +26,7 @@ fn n_generations() -> Option<usize> {
 
 /// A run in `results/`.
 struct Run {
-    /// Of its files, without their endings.
+    /// Name of its files, without suffixes.
     stem: String,
     champion: Value,
     history: Vec<BTreeMap<String, String>>,
@@ -54,7 +54,7 @@ impl Run {
         self.champion["seed"].to_string()
     }
 
-    /// What it is an example of: its task, and its kind of neurons.
+    /// Its task and its kind of neurons.
     fn shows(&self) -> [String; 2] {
         let name = self.champion["name"].as_str().unwrap().trim_end_matches("_original");
         let name = name.trim_end_matches("_ga").trim_end_matches("_snes");
@@ -149,7 +149,7 @@ fn runs_begin_again_with_the_same_bits() {
 #[test]
 fn champions_have_the_fitness_for_which_they_were_chosen() {
     for run in Run::all() {
-        // Means of a distribution were in no generation; evaluations are about those.
+        // The mean of a distribution is in no generation; evaluations cover it.
         let trials = run.champion["trial_fitness"].as_array().unwrap();
         if trials.is_empty() {
             continue;
@@ -177,7 +177,7 @@ fn champions_have_the_fitness_for_which_they_were_chosen() {
     }
 }
 
-/// Trials do not depend on how many there are, so a few of them are enough.
+/// A trial does not depend on the number of trials, so a few are enough.
 #[test]
 fn evaluations_have_the_same_bits_again() {
     let evaluations = fs::read_dir(results("evaluations")).unwrap();
@@ -214,7 +214,7 @@ fn evaluations_have_the_same_bits_again() {
             }
         }
         swarmctl(&args).expect_success();
-        // Without the conditions' names: here they are what they change.
+        // Without the names of the conditions, which are their changes here.
         let rows = |directory: &Path| -> Vec<String> {
             let text = fs::read_to_string(directory.join("trials.csv")).unwrap();
             let rows = text.lines().skip(1).map(|row| row.rsplitn(5, ',').collect::<Vec<_>>());
@@ -224,7 +224,8 @@ fn evaluations_have_the_same_bits_again() {
     }
 }
 
-/// A project with the runs of all seeds; none without Python or the history of this one.
+/// A project with the runs of all seeds; `None` without Python or without the history of this
+/// repository.
 fn project_with_all_runs() -> Option<TempDir> {
     let mut fetch = python_script(results("fetch"))?;
     let first = fs::read_to_string(results("assets.csv")).unwrap();
@@ -259,7 +260,7 @@ fn every_file_that_is_listed_is_here_with_its_digest_or_can_be_fetched() {
     assert_eq!(fs::read_to_string(damaged).unwrap(), "other");
 }
 
-/// Numbers of `docs/reproduction.md`, one of each table.
+/// Compares numbers of `docs/reproduction.md`, one of each table.
 #[test]
 fn the_script_of_the_report_prints_its_numbers() {
     let Some(project) = project_with_all_runs() else { return };
@@ -287,7 +288,7 @@ fn script(path: PathBuf) -> Command {
     command
 }
 
-/// A script in Python; none without it.
+/// A script in Python; `None` without Python.
 fn python_script(path: PathBuf) -> Option<Command> {
     if Command::new("python3").arg("--version").output().is_err() {
         skipped_for_want_of("python3", "apt-get install python3");

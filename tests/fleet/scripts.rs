@@ -1,4 +1,4 @@
-//! Experiments that bring their task as a script, on workers that never saw it.
+//! Experiments that bring their task as a script, on workers that do not know it.
 
 use std::{fs, process::Command};
 
@@ -34,7 +34,7 @@ fn workers_that_never_saw_a_script_compute_the_same_bits_through_a_kill() {
     drop(workers.pop());
     let digests = watch.finish().digests();
     assert_eq!(digests, undisturbed(&experiment), "one worker, in one process");
-    // The fitness is that of the built-in function: only the name of the task differs.
+    // The fitness equals that of the built-in function; only the name of the task differs.
     let best = |experiment: &Experiment| {
         let directory = tempfile::tempdir().unwrap();
         let path = experiment.path();
@@ -46,7 +46,8 @@ fn workers_that_never_saw_a_script_compute_the_same_bits_through_a_kill() {
     assert_eq!(best(&experiment), best(&Experiment::small(5)));
 }
 
-/// Robots that a script controls, breaks and drives a lamp among, beside those that evolve.
+/// A script that controls robots and lets them fail, and moves a lamp, beside the robots that
+/// evolve.
 const ACTS: &str = "
 def control(robot):
     robot.led = robot.heard != None and robot.heard[0] > robot.random()
@@ -80,7 +81,8 @@ fn a_script_that_acts_gives_the_same_bits_on_one_and_on_four_unlike_workers_thro
         objects.insert("lamp".into(), lamp);
     });
     let mut coordinator = CoordinatorProcess::start();
-    // Two with the instructions that every processor has, two with the best that there are.
+    // Two workers with the instructions that every processor has, two with the best of this
+    // processor.
     let worker = |i: usize| {
         let isa: &[&str] = if i < 2 { &["--isa", "portable"] } else { &[] };
         WorkerProcess::start_with(&coordinator.url(), &format!("worker-{i}"), isa)
@@ -122,7 +124,7 @@ fn what_is_wrong_with_a_script_is_said_before_anything_is_computed() {
     let expected = "task.script: task.star:2: nothing has a `robos`; did you mean `robots`?";
     assert!(validated.stderr.contains(expected), "{}", validated.stderr);
     assert_eq!(validated.code, Some(2));
-    // In an early step.
+    // The script fails in an early step.
     fs::write(path.with_file_name("task.star"), "def fitness(world):\n    return [1][world.step]")
         .unwrap();
     let validated = swarmctl(["validate", path.to_str().unwrap()]);
@@ -144,8 +146,8 @@ fn traces_and_simulations_have_the_measures_of_a_script() {
     assert!(header.ends_with(",metric_touching"), "{header}");
 }
 
-/// Harmless for the steps in which a script is tried; then it does what it may in every call, so
-/// that a trial takes many minutes.
+/// Harmless in the steps in which a script is tried; then it uses its whole budget in every call,
+/// so that a trial takes many minutes.
 const BURNS: &str = "
 def fitness(world):
     if world.step < 60:
@@ -178,7 +180,7 @@ fn a_script_that_burns_time_is_ended_by_cancelling_it_and_by_signals() {
     let experiment = Experiment::tiny(2);
     let other = coordinator.watch(coordinator.submit(&experiment.path())).finish();
     assert_eq!(other.digests(), undisturbed(&experiment));
-    // One that is told to stop in the middle of an item does so.
+    // A worker that is told to stop in the middle of an item does so.
     coordinator.submit(&burning.path());
     wait_until_busy(&coordinator);
     let mut stopped = workers.pop().unwrap();
@@ -191,7 +193,7 @@ fn a_script_that_burns_time_is_ended_by_cancelling_it_and_by_signals() {
 #[test]
 fn an_expensive_start_is_tried_for_a_moment_and_accepted_with_a_warning() {
     let coordinator = CoordinatorProcess::start();
-    // Most of what a call may do, in long statements: seconds for the steps that are tried.
+    // Nearly the whole budget of a call, in long statements: seconds for the tried steps.
     let sums = vec!["i + j"; 60].join(", ");
     let loops = "for i in range(2000):\n        for j in range(100): x =";
     let script = format!("def fitness(world):\n    {loops} [{sums}]\n    return 1\n");

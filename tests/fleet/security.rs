@@ -1,4 +1,4 @@
-//! Who is let in, what they are told otherwise, and what nobody gets to see.
+//! Access: admitted peers, errors for the others, and secrets that stay hidden.
 #![allow(clippy::needless_update, reason = "messages get more fields as the protocol grows")]
 
 use std::{
@@ -87,7 +87,7 @@ impl Files {
         CoordinatorProcess::start_with(&options.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
-    /// What becomes of a coordinator that should not start.
+    /// The error of a coordinator that should not start.
     fn refused_coordinator(&self, options: &str) -> String {
         let mut command = Command::new(binary("coordinator"));
         command.args(self.options(options)).arg("--data-dir").arg(self.0.path().join("data"));
@@ -371,7 +371,7 @@ fn what_is_wrong_with_tls_is_said_in_words() {
     ] {
         files.list_fails(&url, &format!("{token} {options}"), code, &[expected]);
     }
-    // By its address the certificate does not fit, by its name it does.
+    // The certificate does not fit the address, but it fits the name.
     let by_address = format!("https://{}", encrypted.address());
     files.list_fails(&by_address, &format!("{token} --tls-ca @ca.pem"), 8, &["--tls-domain"]);
     let named = format!("{token} --tls-ca @ca.pem --tls-domain localhost");
@@ -412,7 +412,7 @@ fn no_log_at_any_level_shows_a_token() {
             for line in lines {
                 let line = line.to_string();
                 for token in [CLIENT_TOKEN, WORKER_TOKEN, WRONG_TOKEN] {
-                    // Half of it would be too much.
+                    // Even half of the token would be too much.
                     assert!(!line.contains(&token[..20]), "{line}");
                 }
             }

@@ -1,10 +1,10 @@
-//! Settings that cannot be read are in the way of those only who need them.
+//! Unreadable settings only affect commands that need them.
 
 use std::fs;
 
 use crate::data_directory::DataDirectory;
 
-/// Commands that ask nobody, or a data directory that is named.
+/// Commands that need no coordinator, or that get a data directory.
 const NEED_NONE: [&str; 16] = [
     "--help",
     "schema",

@@ -1,4 +1,4 @@
-//! What needs no fleet: checking experiment files, and simulating episodes.
+//! Commands without a fleet: checking experiment files, and simulating episodes.
 
 use std::{
     fs,
@@ -86,7 +86,7 @@ fn a_champion_in_the_worlds_of_its_generation_has_the_fitness_that_is_stored() {
     let file = lines.last().unwrap()["champion_file"].as_str().unwrap();
     let champion: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
     let generation = champion["generation"].to_string();
-    // What it was evolved with.
+    // The seed with which it evolved.
     assert_eq!(champion["simulation"], sim_core::FINGERPRINT);
     assert_eq!(champion["seed"], 99);
 
@@ -160,7 +160,7 @@ fn genotypes_and_traces_that_will_not_do_are_one_line_each() {
 #[test]
 fn a_file_is_validated_with_all_its_problems() {
     let bad = Experiment::small(1).edit(|e| {
-        // More than a refusal could carry over the wire.
+        // More problems than a refusal over the wire could carry.
         for i in 0..40 {
             e["topology"]["stimuli"][format!("no-such-sensor-{i}{}", "x".repeat(80))] =
                 json!({"n": 1, "sensor": "sonar"});
@@ -182,7 +182,7 @@ fn a_file_is_validated_with_all_its_problems() {
     assert_eq!(n_lines, problems.len());
     assert!(outcome.stderr.contains("algorithm.generations: "), "{}", outcome.stderr);
 
-    // `run` says the same, and leaves nothing behind.
+    // `run` reports the same, and leaves no files.
     let directory = tempfile::tempdir().unwrap();
     let data_dir = directory.path().join("data");
     let args = ["run", bad.to_str().unwrap(), "--data-dir", data_dir.to_str().unwrap()];

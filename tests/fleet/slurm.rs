@@ -1,4 +1,4 @@
-//! Workers as jobs of a real Slurm: a controller and a node on this machine.
+//! Workers as jobs of a real Slurm, with a controller and a node on this machine.
 
 use std::{
     fs,
@@ -86,7 +86,7 @@ fn workers_are_jobs_of_slurm_as_long_as_there_is_something_to_compute() {
         Running(["slurmctld", "slurmd"].map(|daemon| start(daemon.as_ref(), &["-D"])).into());
 
     let coordinator = CoordinatorProcess::start();
-    // More than one worker is wanted for.
+    // Enough work for more than one worker.
     let population = |file: &mut Value| file["algorithm"]["population_size"] = 24.into();
     let experiment = Experiment::tiny(3).edit(population);
     let id = coordinator.submit(&experiment.path());

@@ -1,4 +1,4 @@
-//! Programs to which the system gives too little.
+//! Programs that get too few resources from the system.
 
 use std::{
     env, fs,
@@ -10,14 +10,14 @@ use std::{
 use harness::{Experiment, SmallDisk, binary, skipped};
 use tempfile::TempDir;
 
-/// Each program, with arguments for which it would wait, or ask somebody.
+/// Each program, with arguments with which it would wait or call a coordinator.
 const PROGRAMS: [(&str, &[&str]); 3] = [
     ("swarmctl", &["--coordinator", "http://127.0.0.1:1", "list"]),
     ("worker", &["--coordinator", "http://127.0.0.1:1"]),
     ("coordinator", &["--listen", "127.0.0.1:0", "--data-dir", "data"]),
 ];
 
-/// A directory that everybody may write to.
+/// A directory to which every user may write.
 fn open_directory() -> TempDir {
     let directory = tempfile::tempdir().unwrap();
     fs::set_permissions(directory.path(), fs::Permissions::from_mode(0o777)).unwrap();
@@ -33,7 +33,7 @@ fn limited(limits: &[&str], program: &str, args: &[&str]) -> Output {
     command.env("HOME", directory.path()).env("RUST_BACKTRACE", "1").output().unwrap()
 }
 
-/// One line says what is missing, and the exit code is the one for that.
+/// Asserts that one line names the missing resource, with the exit code for that.
 fn assert_starved(output: &Output, what: &str) {
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(71), "{what}: {text}");
@@ -41,7 +41,8 @@ fn assert_starved(output: &Output, what: &str) {
     assert!(text.contains("too few threads or file descriptors"), "{what}: {text}");
 }
 
-/// What makes a program one of a user with so many processes; none if that is not possible.
+/// A command prefix that runs a program as a user with this limit of processes; `None` if that is
+/// not possible.
 fn as_nobody(user: u32, n_processes: u32) -> Vec<String> {
     let (user, nproc) = (format!("--reuid={user}"), format!("--nproc={n_processes}"));
     ["setpriv", &user, "--regid=65533", "--clear-groups", "prlimit", &nproc]
@@ -107,7 +108,7 @@ fn shell(directory: &Path, line: &str) -> Output {
         .unwrap()
 }
 
-/// The last line on standard error; panics unless the exit code is that.
+/// The last line on standard error; panics unless the exit code is `code`.
 fn ends_with(output: &Output, code: i32, what: &str) -> String {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(code), "{what}: {text}");
@@ -136,7 +137,7 @@ fn few_file_descriptors_are_enough_or_one_line_says_that_they_are_not() {
             let directory = open_directory();
             let output = shell(directory.path(), &format!("prlimit --nofile={n_files} {line}"));
             let text = String::from_utf8_lossy(&output.stderr).into_owned();
-            // With enough, it is what is wrong with the command line that is said.
+            // With enough resources, the error is about the command line.
             match output.status.code() {
                 Some(71) if n_files < 64 => assert_starved(&output, line),
                 Some(0 | 2 | 3) if n_files > 24 => {}
@@ -270,7 +271,7 @@ fn directories_that_cannot_be_used_are_named_in_one_line() {
         let said = ends_with(&shell(directory.path(), &line), code, &line);
         assert!(said.contains(expected), "{line}: {said}");
     }
-    // What only reads does not mind.
+    // Commands that only read still work.
     for line in ["list", "history 1", "simulate 1", "get 1"] {
         let line = format!("{nobody} swarmctl {line} --data-dir data");
         ends_with(&shell(directory.path(), &line), 0, &line);

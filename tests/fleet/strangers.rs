@@ -1,4 +1,4 @@
-//! What those who know no token can do to those who do, and to the log.
+//! Peers without a token: their effect on other peers and on the log.
 #![allow(clippy::needless_update, reason = "messages get more fields as the protocol grows")]
 
 use std::{fs, io::Write as _, net::TcpStream, sync::mpsc, thread, time::Duration};
@@ -31,7 +31,7 @@ fn n_files_max() -> usize {
     line.and_then(|line| line.split_whitespace().next()?.parse().ok()).unwrap_or(usize::MAX)
 }
 
-/// A call with the client's token on a connection of its own, which must not take long.
+/// Makes a call with the client's token on a connection of its own, which must not take long.
 async fn list(url: &str) {
     let endpoint = Endpoint::from_shared(url.to_owned()).unwrap();
     let call = async {
@@ -90,11 +90,11 @@ fn resets_do_not_fill_the_log_and_are_counted() {
     let coordinator = coordinator(&[]);
     let bytes = resets(500);
     let mut n_connections = 0;
-    // One line is withheld, and a second later another says so.
+    // One line is withheld, and another line reports that a second later.
     let withheld = loop {
         for _ in 0..20 {
             let mut stream = TcpStream::connect(coordinator.address()).unwrap();
-            // The coordinator breaks it off.
+            // The coordinator ends the connection.
             let _ = stream.write_all(&bytes);
             n_connections += 1;
         }

@@ -1,4 +1,4 @@
-//! What people see on a real terminal, however wide, and where there is none.
+//! The output on real terminals of any width, and without a terminal.
 
 use harness::Terminal;
 
@@ -33,7 +33,7 @@ const FOR_PEOPLE: [&str; 23] = [
     "delete 1 --dry-run",
 ];
 
-/// What is seen of a text, without its colours; where the cursor is moved, another line begins.
+/// The visible text, without colours; a move of the cursor begins another line.
 fn seen(line: &str) -> String {
     let mut seen = String::new();
     let mut chars = line.chars();
@@ -72,7 +72,7 @@ fn no_answer_is_wider_than_the_terminal_or_shows_escape_codes() {
                 problems.push(format!("{command}, {columns}: {shown:#?}"));
             }
             for line in seen(&shown.stdout).split(['\n', '\r']) {
-                // What is to be copied is never broken: commands, and a digest.
+                // Text for copying, such as commands and digests, is never wrapped.
                 let is_whole = line.trim_start().starts_with("-> ") || !line.trim().contains(' ');
                 if !is_whole && line.trim_end().chars().count() > columns {
                     problems.push(format!("{command}, {columns}: {line}"));
@@ -121,7 +121,7 @@ fn colours_do_not_move_columns_and_are_where_they_are_wanted() {
         let forced = terminal.clone().with("CLICOLOR_FORCE", "1");
         let forced = forced.swarmctl(&format!("{command} | cat"), "").stdout;
         assert!(forced.contains("\u{1b}[1m"), "{command} is to have colours: {forced}");
-        // Programs get none, whatever is forced.
+        // Programs get no colours, even if these are forced.
         let json = terminal.clone().with("CLICOLOR_FORCE", "1");
         let json = json.swarmctl(&format!("{command} --output json"), "").stdout;
         assert!(!json.contains(ESCAPE), "{command}: {json}");

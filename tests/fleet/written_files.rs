@@ -1,4 +1,4 @@
-//! Every command that writes files, and what it does to those that exist.
+//! Every command that writes files, and its effect on existing ones.
 
 use std::{
     fs,
@@ -7,7 +7,7 @@ use std::{
 
 use crate::data_directory::DataDirectory;
 
-/// A command, and a file that it writes; where it chooses the name, the directory.
+/// A command, and a file that it writes; or the directory, if the command chooses the name.
 const WRITERS: [(&str, &str); 14] = [
     ("plot 1 --to plot.svg", "plot.svg"),
     ("plot history.csv --to plot.png", "plot.png"),
@@ -48,7 +48,7 @@ fn no_command_writes_over_a_file_unless_it_is_told_to() {
             "{line}"
         );
         let precious: Vec<u8> = b"precious".to_vec();
-        // A database stays one: only one of these is replaced by --force.
+        // Keeps a written database, because `--force` replaces nothing else there.
         let is_data_directory = written.iter().any(|(path, _)| path.ends_with("swarmevo.sqlite3"));
         if !is_data_directory {
             written.iter().for_each(|(path, _)| fs::write(path, &precious).unwrap());

@@ -9,13 +9,13 @@ use std::{
 
 /// Path of one of the workspace's programs: `coordinator`, `worker`, `swarmctl`.
 ///
-/// Cargo builds programs only for the tests of their own package, so the first
-/// call builds them all, into the directory and profile of the running test. It
-/// names a test, too: with one, libraries have the features that `cargo test
-/// --workspace` has given them, and need not be compiled a second time.
+/// Cargo builds programs only for the tests of their own package, so the first call builds them
+/// all, into the directory and profile of the running test. The build also names a test: with
+/// one, libraries have the same features as in `cargo test --workspace`, and are not compiled a
+/// second time.
 ///
-/// `SWARM_PROGRAMS` names a directory of programs that are built already, so that a
-/// benchmark can compare two versions in turns.
+/// `SWARM_PROGRAMS` names a directory of built programs, so that a benchmark can compare two
+/// versions in turns.
 pub fn binary(name: &str) -> PathBuf {
     static DIRECTORY: OnceLock<PathBuf> = OnceLock::new();
     let directory =
@@ -33,8 +33,8 @@ fn build() -> PathBuf {
     };
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut build = Command::new(cargo);
-    // What Cargo tells a test about its package makes build scripts of dependencies run again,
-    // ring's for one, and half of the workspace be compiled a second time.
+    // Cargo's variables about the test's package would make build scripts of dependencies, such
+    // as ring's, run again, and recompile half of the workspace.
     for (name, _) in env::vars_os() {
         let text = name.to_string_lossy();
         if text.starts_with("CARGO_PKG_") || text.starts_with("CARGO_MANIFEST_") {

@@ -21,8 +21,8 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// The thesis's leader selection, cut down so that a genotype takes some
-    /// milliseconds and a generation takes about a tenth of a second.
+    /// The thesis's leader selection, reduced so that a genotype takes some milliseconds, and a
+    /// generation about a tenth of a second.
     pub fn small(generations: u64) -> Self {
         let text = fs::read_to_string(workspace_file("configs/leader_selection_snes.json"))
             .expect("shipped with the project");
@@ -48,7 +48,7 @@ impl Experiment {
         })
     }
 
-    /// Any content.
+    /// A file of any content.
     pub fn from_value(value: Value) -> Self {
         let directory = tempfile::tempdir().expect("a temporary directory");
         let experiment = Self { directory, value };

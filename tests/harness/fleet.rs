@@ -70,7 +70,7 @@ impl CoordinatorProcess {
         Self { process, address, args, data_dir, _temporary: temporary }
     }
 
-    /// Starts a coordinator that has ended again: same data, same address.
+    /// Restarts a coordinator that has ended, with the same data and address.
     pub fn restart(&mut self) {
         (self.process, self.address) = spawn(&self.address, &self.data_dir, &self.args, None);
     }
@@ -95,7 +95,7 @@ impl CoordinatorProcess {
         Connection::open(self.data_dir.join("swarmevo.sqlite3")).expect("the database opens")
     }
 
-    /// Generations of an experiment in the database.
+    /// Number of generations of an experiment in the database.
     pub fn n_committed(&self, id: u64) -> u64 {
         self.database()
             .query_row("SELECT count(*) FROM generations WHERE experiment_id = ?1", [id], |row| {
@@ -132,7 +132,7 @@ impl CoordinatorProcess {
     }
 }
 
-/// Runs a coordinator that does not start, or that nobody stops, to its end.
+/// Runs a coordinator to its end, which fails to start or ends by itself.
 pub fn run_coordinator(listen: &str, data_dir: &Path) -> Outcome {
     let mut command = Command::new(binary("coordinator"));
     command.args(["--listen", listen, "--data-dir"]).arg(data_dir);
@@ -222,12 +222,12 @@ impl Watch {
     }
 }
 
-/// What a watcher has seen of an experiment.
+/// The lines that a watcher has printed.
 #[derive(Debug)]
 pub struct Finished {
     /// A line per generation.
     pub generations: Vec<LogLine>,
-    /// The end.
+    /// The last line.
     pub last: LogLine,
 }
 
@@ -239,7 +239,7 @@ impl Finished {
     }
 }
 
-/// The digests of an experiment with which nothing interferes.
+/// The digests of an undisturbed run of an experiment.
 pub fn undisturbed(experiment: &Experiment) -> Vec<String> {
     let coordinator = CoordinatorProcess::start();
     let _workers = WorkerProcess::start_many(&coordinator, 2);

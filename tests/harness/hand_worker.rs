@@ -1,4 +1,4 @@
-//! A worker whose every word is chosen by the test.
+//! A worker whose messages the test chooses one by one.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Status, Streaming};
 
-/// The introduction of a worker that will be let in.
+/// The introduction of a worker that the coordinator accepts.
 pub fn hello() -> Hello {
     Hello {
         protocol_version: PROTOCOL_VERSION,
@@ -26,7 +26,7 @@ pub fn hello() -> Hello {
     }
 }
 
-/// The number of an experiment. Panics if the job is none.
+/// The number of an experiment. Panics if the job is not an experiment.
 pub fn experiment_of(job: Option<JobId>) -> u64 {
     match job.and_then(|job| job.job) {
         Some(Job::Experiment(id)) => id,
@@ -34,8 +34,7 @@ pub fn experiment_of(job: Option<JobId>) -> u64 {
     }
 }
 
-/// The experiment and the trial set that assignments are of. Panics if they are of no
-/// experiment.
+/// The experiment and the trial set of assignments. Panics if their job is not an experiment.
 pub fn trial_set_of(assignments: &Assignments) -> (u64, sim_core::TrialSet) {
     let trial_set = match assignments.trial_set.and_then(|set| set.trial_set) {
         Some(trial_set::TrialSet::Generation(generation)) => {
@@ -53,17 +52,17 @@ pub fn trial_set_of(assignments: &Assignments) -> (u64, sim_core::TrialSet) {
     (experiment_of(assignments.job), trial_set)
 }
 
-/// The stream of a worker. It says nothing by itself, not even heartbeats.
+/// The stream of a worker. It sends nothing by itself, not even heartbeats.
 #[derive(Debug)]
 pub struct HandWorker {
     outbox: mpsc::Sender<WorkRequest>,
     inbox: Streaming<WorkResponse>,
-    /// The latest of each experiment.
+    /// The latest distribution of each experiment.
     distributions: BTreeMap<u64, Distribution>,
 }
 
 impl HandWorker {
-    /// Connects and says Hello.
+    /// Connects and sends `Hello`.
     pub async fn connect(url: &str, hello: Hello) -> Result<Self, Status> {
         let client = WorkerServiceClient::connect(url.to_owned()).await;
         let mut client = client.map_err(|error| Status::unavailable(error.to_string()))?;
@@ -74,8 +73,8 @@ impl HandWorker {
         Ok(Self { outbox, inbox, distributions: BTreeMap::new() })
     }
 
-    /// The next message. Genotypes that it is to draw are in its assignments as if they had
-    /// been sent.
+    /// The next message. Assignments contain all genotypes, including those that the worker draws
+    /// itself.
     pub async fn receive(&mut self) -> Result<work_response::Message, Status> {
         let response = self.inbox.message().await?;
         let response = response.ok_or_else(|| Status::unavailable("the stream has ended"))?;
@@ -116,14 +115,14 @@ impl HandWorker {
         }
     }
 
-    /// Says anything.
+    /// Sends any message.
     pub async fn say(&self, message: work_request::Message) {
-        // If the stream is gone, `receive` will tell.
+        // If the stream has ended, `receive` reports it.
         let _ = self.outbox.send(WorkRequest { message: Some(message) }).await;
     }
 
-    /// Closes its side of the stream, behind all it has said, and waits for the
-    /// coordinator to close the other.
+    /// Closes its side of the stream after all messages, and waits for the coordinator to close
+    /// the other side.
     pub async fn hang_up(self) {
         let Self { outbox, mut inbox, .. } = self;
         drop(outbox);

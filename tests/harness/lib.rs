@@ -1,4 +1,4 @@
-//! Starts real fleets, kills parts of them, and reads what they say.
+//! Starts real fleets, kills parts of them, and reads their output.
 //!
 //! Nothing here sleeps: tests wait for lines of the processes' logs, with a
 //! deadline that only a broken program meets.

@@ -10,7 +10,7 @@ use crate::LoggingProcess;
 /// A scrape, parsed.
 #[derive(Debug)]
 pub struct Samples {
-    /// As it was.
+    /// The original text.
     pub text: String,
     samples: Vec<Sample>,
 }
@@ -22,8 +22,7 @@ struct Sample {
     value: f64,
 }
 
-/// Where a process that was started with `--metrics-listen 127.0.0.1:0` serves
-/// metrics.
+/// The address at which a process started with `--metrics-listen 127.0.0.1:0` serves metrics.
 pub fn metrics_address(process: &LoggingProcess) -> String {
     let line = process.wait_for("metrics' address", |line| line["message"] == "metrics served");
     line["address"].as_str().expect("text").to_owned()
@@ -52,7 +51,7 @@ impl Samples {
         value
     }
 
-    /// That value, which has to be there.
+    /// The value of [`Self::find`], which must exist.
     pub fn value(&self, name: &str, labels: &[(&str, &str)]) -> f64 {
         self.find(name, labels).unwrap_or_else(|| panic!("no {name} {labels:?}: {}", self.text))
     }
@@ -76,7 +75,7 @@ fn parse(line: &str) -> Sample {
 /// The status and the content at a path.
 pub fn http_get(address: &str, path: &str) -> (u16, String) {
     let mut stream = TcpStream::connect(address).expect("somebody listens");
-    // Of a version in which answers are not cut into chunks.
+    // HTTP/1.0, in which answers are not chunked.
     write!(stream, "GET {path} HTTP/1.0\r\nHost: {address}\r\n\r\n").expect("it can be written");
     let mut answer = String::new();
     stream.read_to_string(&mut answer).expect("an answer in UTF-8");

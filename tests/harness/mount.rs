@@ -1,4 +1,4 @@
-//! A small file system of its own, for tests that fill it up.
+//! A small separate file system, for tests that fill it up.
 
 use std::{
     fs::{self, File},
@@ -16,7 +16,7 @@ pub struct SmallDisk {
 }
 
 impl SmallDisk {
-    /// Mounts one; none if this process may not.
+    /// Mounts a disk; `None` if this process lacks the privilege.
     pub fn mount(n_bytes: u64) -> Option<Self> {
         let directory = tempfile::tempdir().expect("a temporary directory");
         let size = format!("size={n_bytes}");
@@ -26,12 +26,12 @@ impl SmallDisk {
         is_mounted.then_some(Self { directory })
     }
 
-    /// Where it is mounted.
+    /// Its mount point.
     pub fn path(&self) -> &Path {
         self.directory.path()
     }
 
-    /// Writes until there is no room for another byte.
+    /// Writes until not another byte fits.
     pub fn fill(&self) {
         let mut ballast = File::create(self.ballast()).expect("there is room for an empty file");
         for block in [&[0_u8; 4096][..], &[0]] {
@@ -44,12 +44,12 @@ impl SmallDisk {
         }
     }
 
-    /// Removes what filled it.
+    /// Removes the file that filled it.
     pub fn make_room(&self) {
         fs::remove_file(self.ballast()).expect("it is there");
     }
 
-    /// Makes it read-only, or writable again; nobody may be writing.
+    /// Makes it read-only, or writable again; no program may be writing to it.
     pub fn set_read_only(&self, is_read_only: bool) {
         let options = if is_read_only { "remount,ro" } else { "remount,rw" };
         let mut mount = Command::new("mount");

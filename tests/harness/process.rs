@@ -14,10 +14,10 @@ use serde_json::Value;
 
 use crate::binary;
 
-/// Only a program that hangs takes so long.
+/// A deadline that only a hanging program misses.
 pub(crate) const DEADLINE: Duration = Duration::from_secs(120);
 
-/// Why the lock of the lines may be trusted.
+/// Why the lock of the lines cannot be poisoned.
 const POISONED: &str = "nothing panics while it holds the lines";
 
 /// A line of a JSON log.
@@ -36,7 +36,7 @@ struct Lines {
     changed: Condvar,
 }
 
-/// Where a process prints its JSON lines.
+/// The stream on which a process prints its JSON lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Source {
     Stdout,
@@ -58,7 +58,7 @@ impl LoggingProcess {
         };
         thread::spawn(move || {
             for line in BufReader::new(reader).lines().map_while(Result::ok) {
-                // Not JSON: a panic's text, say. Show it with the test's output.
+                // Not JSON, such as the text of a panic: show it with the test's output.
                 match serde_json::from_str(&line) {
                     Ok(value) => sink.read.lock().expect(POISONED).0.push(value),
                     Err(_) => eprintln!("{line}"),
@@ -113,12 +113,12 @@ impl LoggingProcess {
         self.child.id()
     }
 
-    /// The memory that it takes, MiB.
+    /// Its present memory, MiB.
     pub fn memory_mib(&self) -> u64 {
         self.status_mib("VmRSS:")
     }
 
-    /// The most memory that it has taken so far, MiB.
+    /// Its peak memory so far, MiB.
     pub fn peak_memory_mib(&self) -> u64 {
         self.status_mib("VmHWM:")
     }
@@ -169,10 +169,10 @@ impl Drop for LoggingProcess {
     }
 }
 
-/// What a command left behind.
+/// The result of a command.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Exit code; none if a signal ended it.
+    /// Exit code; `None` if a signal ended it.
     pub code: Option<i32>,
     /// Standard output.
     pub stdout: String,

@@ -1,4 +1,4 @@
-//! Prometheus and its tool, from Debian's package `prometheus`, if they are here.
+//! Prometheus and its tool, from Debian's package `prometheus`, if they are installed.
 
 use std::{
     fmt::Write as _,
@@ -13,7 +13,7 @@ use tempfile::TempDir;
 
 use crate::{LoggingProcess, http_get, process::Source};
 
-/// What `promtool check metrics` has against a scrape; none if there is no promtool.
+/// The complaints of `promtool check metrics` about a scrape; `None` without promtool.
 pub fn promtool_check_metrics(text: &str) -> Option<String> {
     let mut promtool = Command::new("promtool")
         .args(["check", "metrics"])
@@ -30,8 +30,7 @@ pub fn promtool_check_metrics(text: &str) -> Option<String> {
     Some(if output.status.success() { said.into() } else { format!("{}: {said}", output.status) })
 }
 
-/// What `promtool check config` says about a file, if that is bad; none if there is
-/// no promtool.
+/// The result of `promtool check config` for a file; `None` without promtool.
 pub fn promtool_check_config(path: &Path) -> Option<Result<(), String>> {
     let output = Command::new("promtool").args(["check", "config"]).arg(path).output().ok()?;
     let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
@@ -47,7 +46,7 @@ pub struct Prometheus {
 }
 
 impl Prometheus {
-    /// Starts one that scrapes each `(job, address)` every second; none if it is not
+    /// Starts a Prometheus that scrapes each `(job, address)` every second; `None` if it is not
     /// installed.
     pub fn start(targets: &[(&str, &str)]) -> Option<Self> {
         Command::new("prometheus").arg("--version").output().ok()?;
@@ -72,12 +71,12 @@ impl Prometheus {
         Some(Self { _process: process, address, _directory: directory })
     }
 
-    /// The series that an expression gives now.
+    /// The present series of an expression.
     pub fn query(&self, expression: &str) -> Vec<Value> {
         let encoded: String = expression.bytes().map(|byte| format!("%{byte:02X}")).collect();
         let path = format!("/api/v1/query?query={encoded}");
         let (status, text) = http_get(&self.address, &path);
-        // It answers so while it starts.
+        // Prometheus answers like this while it starts.
         if status == 503 {
             return Vec::new();
         }

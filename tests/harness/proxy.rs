@@ -1,8 +1,8 @@
 //! A network between a worker and its coordinator that tests can cut.
 //!
-//! A *held* direction takes bytes and delivers them when it is healed, as TCP
-//! does across a network that drops packets for a while. A *cut* network resets
-//! its connections and refuses others.
+//! A *held* direction accepts bytes and delivers them when it is healed, like TCP across a
+//! network that drops packets for a while. A *cut* network resets its connections and refuses
+//! others.
 
 use std::{
     io::{Read as _, Write as _},
@@ -13,19 +13,19 @@ use std::{
 
 use crate::process::DEADLINE;
 
-/// Why the lock of the state may be trusted.
+/// Why the lock of the state cannot be poisoned.
 const POISONED: &str = "nothing panics while it holds the state";
 
-/// A way through the network.
+/// A direction through the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// What workers say.
+    /// Messages of workers.
     ToCoordinator,
-    /// What workers are told.
+    /// Messages to workers.
     ToWorker,
 }
 
-/// What has happened so far; pairs are indexed by [`Direction`].
+/// Counts of events so far; pairs are indexed by [`Direction`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Traffic {
     /// Connections that were made.
@@ -36,7 +36,7 @@ pub struct Traffic {
     pub n_reset: u64,
     /// Pieces of a stream that were delivered.
     pub n_delivered: [u64; 2],
-    /// Pieces of a stream that came in while their direction was held.
+    /// Pieces of a stream that arrived while their direction was held.
     pub n_held: [u64; 2],
 }
 
@@ -85,7 +85,7 @@ impl Proxy {
         Self { address, shared }
     }
 
-    /// The coordinator's URL by this way.
+    /// The coordinator's URL through this network.
     pub fn url(&self) -> String {
         format!("http://{}", self.address)
     }
@@ -108,12 +108,12 @@ impl Proxy {
         self.shared.change(|state| (state.is_held, state.is_cut) = ([false; 2], false));
     }
 
-    /// What has happened so far.
+    /// The counts of events so far.
     pub fn traffic(&self) -> Traffic {
         self.shared.lock().traffic
     }
 
-    /// Waits for something to happen.
+    /// Waits until a condition on the counts holds.
     pub fn wait_for(&self, what: &str, has_happened: impl Fn(&Traffic) -> bool) -> Traffic {
         let (state, timeout) = self
             .shared
@@ -133,7 +133,7 @@ impl Drop for Proxy {
             state.is_over = true;
             state.reset_all();
         });
-        // Wakes whoever accepts connections.
+        // Wakes the thread that accepts connections.
         let _ = TcpStream::connect(self.address);
     }
 }
@@ -156,8 +156,7 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// Connects a worker with the coordinator, if the network is whole and there
-    /// is one.
+    /// Connects a worker with the coordinator, if the network is whole and a coordinator listens.
     fn connect(self: &Arc<Self>, worker: TcpStream) {
         let is_cut = self.lock().is_cut;
         let coordinator = if is_cut { None } else { TcpStream::connect(&self.target).ok() };

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use crate::{Outcome, skipped_for_want_of, workspace_file};
 
-/// Where `.ci/run` puts a Python with what the example requires.
+/// The Python that `.ci/run` installs with the example's requirements.
 const VIRTUAL_ENVIRONMENT: &str = "target/python/bin/python";
 
 /// A Python with grpcio, and the code that it generates from the proto files.
@@ -22,7 +22,7 @@ pub struct PythonClient {
     generated: TempDir,
 }
 
-/// A Python that has a module; none, and a line that says that the test is skipped, without.
+/// A Python that has a module; `None`, with a line that the test is skipped, if there is none.
 pub fn python_with(module: &str) -> Option<PathBuf> {
     let interpreter = env::var_os("SWARM_TEST_PYTHON")
         .map_or_else(|| workspace_file(VIRTUAL_ENVIRONMENT), PathBuf::from);
@@ -40,7 +40,7 @@ pub fn python_with(module: &str) -> Option<PathBuf> {
 }
 
 impl PythonClient {
-    /// None, and a line that says that the test is skipped, without a Python.
+    /// Finds a Python; without one, returns `None` and prints that the test is skipped.
     pub fn find() -> Option<Self> {
         let interpreter = env::var_os("SWARM_TEST_PYTHON")
             .map_or_else(|| workspace_file(VIRTUAL_ENVIRONMENT), PathBuf::from);
@@ -57,7 +57,7 @@ impl PythonClient {
         Some(client)
     }
 
-    /// As the example's first lines say.
+    /// Generates the code as the example's first lines say.
     fn generate(&self) {
         let option = |name: &str, path: &Path| {
             let mut option = OsString::from(name);
@@ -108,7 +108,7 @@ impl PythonClient {
 pub struct RunningPythonClient {
     child: Child,
     rest: BufReader<ChildStdout>,
-    /// What has been read of it.
+    /// The output read so far.
     stdout: String,
 }
 

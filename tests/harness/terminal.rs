@@ -1,4 +1,4 @@
-//! Programs on a terminal.
+//! Runs programs on a terminal.
 
 use std::{
     io::Write as _,
@@ -17,7 +17,7 @@ pub struct Terminal {
 }
 
 impl Terminal {
-    /// None, and a line that says that the test is skipped, without `script`.
+    /// Finds `script`; without it, returns `None` and prints that the test is skipped.
     pub fn find(directory: &Path, columns: usize) -> Option<Self> {
         let found = Command::new("script").arg("--version").output();
         if !found.is_ok_and(|output| output.status.success()) {
@@ -34,8 +34,8 @@ impl Terminal {
         self
     }
 
-    /// Runs `swarmctl ARGS` on it; `typed` is what somebody types. All that is seen is in
-    /// `stdout`. The arguments may end in what a shell makes of them, such as `| cat`.
+    /// Runs `swarmctl ARGS` on it; `typed`: the user's input. All visible text is in `stdout`.
+    /// The arguments may end in shell syntax, such as `| cat`.
     pub fn swarmctl(&self, args: &str, typed: &str) -> Outcome {
         let program = binary("swarmctl");
         let line = format!("stty cols {} rows 50; {} {args}", self.columns, program.display());
@@ -55,7 +55,7 @@ impl Terminal {
         let mut child = command.spawn().expect("script starts");
         let mut keyboard = child.stdin.take().expect("piped");
         keyboard.write_all(typed.as_bytes()).expect("script reads");
-        // At the end of its input `script` ends that of the program.
+        // At the end of its input, `script` closes the program's input.
         drop(keyboard);
         let output = child.wait_with_output().expect("script ends");
         let seen = String::from_utf8(output.stdout).expect("UTF-8").replace("\r\n", "\n");

@@ -1,4 +1,4 @@
-//! Addresses to listen on, as people write them.
+//! Parses addresses to listen on, as people write them.
 
 use std::net::{SocketAddr, ToSocketAddrs as _};
 
@@ -7,7 +7,7 @@ use std::net::{SocketAddr, ToSocketAddrs as _};
 ///
 /// # Errors
 ///
-/// What is wrong, with an example.
+/// If the text is not such an address; the message has an example.
 pub fn listen_address(text: &str) -> Result<SocketAddr, String> {
     if let Ok(address) = text.parse() {
         return Ok(address);

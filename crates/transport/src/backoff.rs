@@ -1,4 +1,4 @@
-//! How long to wait before connecting again: exponential, with full jitter.
+//! Delays before reconnections: exponential, with full jitter.
 //!
 //! Full jitter (a delay uniform between 0 and a bound that doubles) spreads a
 //! whole fleet evenly over time when its coordinator comes back; see M. Brooker,
@@ -15,7 +15,7 @@ pub struct Backoff {
 }
 
 impl Backoff {
-    /// Delays up to `min` at first and up to `max` at last.
+    /// Delays up to `min` at first, and up to `max` in the end.
     pub fn new(min: Duration, max: Duration) -> Self {
         Self { min, max, bound: min }
     }

@@ -10,20 +10,20 @@ const LIMIT: Duration = Duration::from_secs(1);
 const SHOWN_BYTES_MAX: usize = 60;
 /// A server that speaks HTTP/1 answers this; a coordinator closes the connection.
 const REQUEST: &[u8] = b"GET / HTTP/1.0\r\n\r\n";
-/// How an alert of TLS begins.
+/// The first bytes of a TLS alert.
 const TLS_ALERT: &str = "\u{15}\u{3}";
 
-/// What a server says to whom speaks neither TLS nor HTTP/2.
+/// A server's answer to a client that speaks neither TLS nor HTTP/2.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Banner {
     /// A line of text, of at most 60 bytes.
     Line(String),
-    /// That it does not understand: it speaks TLS.
+    /// A TLS alert: the server speaks TLS.
     Tls,
 }
 
-/// What the server at `HOST:PORT` says; none if no server is there, or if it is not text, as
-/// that of a coordinator (HTTP/2) is not. Takes up to a second.
+/// The banner of the server at `HOST:PORT`. `None` if no server answers, or if the answer is not
+/// text, as with a coordinator, which speaks HTTP/2. Takes up to a second.
 pub async fn banner(address: &str) -> Option<Banner> {
     let answer = timeout(LIMIT, answer(address)).await.ok()?.ok()?;
     if answer.starts_with(TLS_ALERT) {
@@ -61,7 +61,7 @@ mod tests {
         let address = listener.local_addr().unwrap().to_string();
         thread::spawn(move || {
             for stream in listener.incoming() {
-                // A client that is gone needs no answer.
+                // A client that has gone needs no answer.
                 let _ = stream.and_then(|mut stream| stream.write_all(banner));
             }
         });

@@ -38,7 +38,7 @@ pub enum CredentialError {
     HalfIdentity,
 }
 
-/// The options that a worker and a client have in common.
+/// The options that worker and client share.
 #[derive(Debug, Clone, Default, PartialEq, Eq, clap::Args)]
 pub struct CredentialArgs {
     /// PEM file of the authorities that the coordinator's certificate is checked
@@ -84,7 +84,11 @@ impl CredentialArgs {
         Expiries::from_files(self.tls_cert.as_deref(), self.tls_ca.as_deref())
     }
 
-    /// Reads all files. The token is in a file or in an environment variable.
+    /// Reads all files. The token comes from a file or from an environment variable.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be read or is invalid, or if options conflict.
     pub fn load(
         &self,
         token_file: Option<&Path>,

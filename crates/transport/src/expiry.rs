@@ -1,4 +1,4 @@
-//! Certificates of this program that will expire, said before they do.
+//! Warns of certificates of this program before they expire.
 
 use std::{
     fs,
@@ -13,16 +13,16 @@ use x509_parser::parse_x509_certificate;
 
 use crate::tls_diagnosis::date;
 
-/// How long before its end a certificate is warned of.
+/// Time before a certificate's end from which on to warn.
 const NOTICE: Duration = Duration::from_hours(14 * 24);
 /// Time between two looks.
 const INTERVAL: Duration = Duration::from_hours(24);
 
-/// The ends of the certificates in the files that a program uses.
+/// The expiry dates of the certificates in a program's files.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Expiries(Vec<Expiry>);
 
-/// The end of what is in a file.
+/// The expiry date of the certificates in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Expiry {
     path: PathBuf,
@@ -31,9 +31,8 @@ pub struct Expiry {
 }
 
 impl Expiries {
-    /// Of a certificate with those between it and its authority, all of which are needed; and of
-    /// authorities, one of which is enough. A file that cannot be read is refused by whoever uses
-    /// it, and is left out here.
+    /// The expiry dates of a certificate chain, all of whose certificates are needed, and of
+    /// authorities, of which one is enough. Ignores unreadable files, which other code reports.
     pub fn from_files(chain: Option<&Path>, authorities: Option<&Path>) -> Self {
         let chain = chain.and_then(|path| Some((path, ends(path).into_iter().min()?)));
         let authorities = authorities.and_then(|path| Some((path, ends(path).into_iter().max()?)));
@@ -41,13 +40,13 @@ impl Expiries {
         Self(found.map(|(path, at)| Expiry { path: path.to_owned(), at }).collect())
     }
 
-    /// Those that have expired at a time, or will have soon.
+    /// The files whose certificates have expired at this time, or will expire soon.
     pub fn near(&self, now: SystemTime) -> impl Iterator<Item = &Expiry> {
         let soon = seconds(now + NOTICE);
         self.0.iter().filter(move |expiry| expiry.at < soon)
     }
 
-    /// Logs those that will expire soon, now and every day.
+    /// Logs certificates that will expire soon, now and every day.
     pub async fn watch(self, clock: impl Fn() -> SystemTime) {
         while !self.0.is_empty() {
             let now = clock();
@@ -60,7 +59,7 @@ impl Expiries {
 }
 
 impl Expiry {
-    /// What is said of it at a time.
+    /// The warning at this time.
     pub fn text(&self, now: SystemTime) -> String {
         let (path, at) = (self.path.display(), date(self.at));
         let now = seconds(now);

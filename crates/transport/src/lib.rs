@@ -1,9 +1,8 @@
-//! How the programs reach and trust each other: tokens, TLS, and the limits that
-//! both ends of a connection have to agree on.
+//! Secure connections between the programs: tokens, TLS, and the limits that both ends of a
+//! connection share.
 //!
-//! A worker or client turns an address and its [`Credentials`] into a [`Link`],
-//! which refuses whatever would give a secret away. `docs/security.md` has the
-//! model.
+//! A worker or client turns an address and its [`Credentials`] into a [`Link`], which refuses
+//! configurations that would reveal a secret. `docs/security.md` has the model.
 
 mod address;
 mod backoff;
@@ -36,6 +35,6 @@ pub use token::{BEARER, Token, TokenError};
 /// 512 results, more than a worker sends at once, of 1,000 trials each have about
 /// 4 MB.
 pub const TO_COORDINATOR_LEN_MAX: usize = 8 << 20;
-/// Largest message from a coordinator, bytes: a network written out as JSON is
-/// long, and so is a list of all experiments.
+/// Largest message from a coordinator, bytes: networks as JSON and lists of all experiments are
+/// long.
 pub const FROM_COORDINATOR_LEN_MAX: usize = 64 << 20;

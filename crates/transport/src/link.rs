@@ -29,10 +29,10 @@ pub struct Link {
 #[derive(Debug, Clone, Default)]
 pub struct Bearer(Option<MetadataValue<Ascii>>);
 
-/// Why a link cannot be made: the input is wrong.
+/// Why a link cannot be made; the caller has to fix the input.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The address is not one of a coordinator.
+    /// The address is not the address of a coordinator.
     #[error(
         "`{address}` is not the address of a coordinator ({reason}); expected something like \
          http://127.0.0.1:7700"
@@ -40,7 +40,7 @@ pub enum LinkError {
     Address {
         /// The address.
         address: String,
-        /// What is wrong with it.
+        /// The mistake in it.
         reason: String,
     },
     /// TLS without an authority to check the coordinator's certificate against.
@@ -61,7 +61,12 @@ pub enum LinkError {
 }
 
 impl Link {
-    /// Checks that a secret stays one.
+    /// Makes a link.
+    ///
+    /// # Errors
+    ///
+    /// If the address is invalid, if the credentials do not fit it, or if the token would be sent
+    /// unencrypted over a network.
     pub fn new(address: &str, credentials: &Credentials) -> Result<Self, LinkError> {
         let not_an_address =
             |reason: String| LinkError::Address { address: address.to_owned(), reason };
@@ -131,7 +136,7 @@ impl Interceptor for Bearer {
     }
 }
 
-/// Whether what is sent there stays on this machine.
+/// Whether data sent to this address stays on this machine.
 pub fn is_loopback(uri: &Uri) -> bool {
     let Some(host) = uri.host() else { return false };
     let host = host.trim_start_matches('[').trim_end_matches(']');

@@ -1,4 +1,4 @@
-//! Certificates and keys, from PEM files.
+//! Reads certificates and keys from PEM files.
 
 use std::{
     fmt, fs, io,
@@ -14,7 +14,7 @@ pub struct Identity {
     key: Vec<u8>,
 }
 
-/// Why a file is of no use.
+/// Why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum PemError {
     /// It cannot be read.
@@ -22,33 +22,37 @@ pub enum PemError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
-    /// It holds something else.
+    /// It lacks the required section.
     #[error("{} holds no {what} in PEM form", path.display())]
     Absent {
         /// The file.
         path: PathBuf,
-        /// What it should hold.
+        /// The required section.
         what: &'static str,
     },
 }
 
 impl Identity {
     /// Reads a certificate chain and its key.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be read, or lacks its section.
     pub fn read(certificate: &Path, key: &Path) -> Result<Self, PemError> {
         let chain = read(certificate, "CERTIFICATE-----", "certificate")?;
         let key = read(key, "PRIVATE KEY-----", "private key")?;
         Ok(Self { chain, key })
     }
 
-    /// As the transport wants it.
+    /// The identity for tonic.
     pub fn to_tonic(&self) -> transport::Identity {
         transport::Identity::from_pem(&self.chain, &self.key)
     }
 
-    /// The certificate and those between it and its authority, in PEM form.
+    /// The certificate and its intermediate certificates, in PEM form.
     pub(crate) fn chain(&self) -> &[u8] {
         &self.chain
     }
@@ -66,12 +70,16 @@ impl fmt::Debug for Identity {
 }
 
 /// Reads the certificates of authorities.
+///
+/// # Errors
+///
+/// If the file cannot be read, or has no certificate.
 pub fn certificates(path: &Path) -> Result<transport::Certificate, PemError> {
     read(path, "CERTIFICATE-----", "certificate").map(transport::Certificate::from_pem)
 }
 
-/// Reads a file that has a section of the given label. The transport would take
-/// a file without any for an empty list.
+/// Reads a file that must have a section of the given label. The transport would silently read a
+/// file without one as an empty list.
 fn read(path: &Path, label: &str, what: &'static str) -> Result<Vec<u8>, PemError> {
     let bytes =
         fs::read(path).map_err(|source| PemError::File { path: path.to_owned(), source })?;

@@ -1,4 +1,4 @@
-//! TLS to a peer whose certificate is known beforehand: one's own.
+//! TLS to a peer with a known certificate: the caller's own.
 
 use std::sync::Arc;
 
@@ -14,20 +14,23 @@ use rustls::{
 
 use crate::Identity;
 
-/// Why there is no such side of TLS.
+/// Why the configuration cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PinError {
-    /// Something in a PEM file is damaged.
+    /// A PEM file is damaged.
     #[error("damaged PEM: {0}")]
     Pem(#[from] pem::Error),
-    /// The certificate and the key cannot be used, or not together.
+    /// The certificate or the key is invalid, or they do not belong together.
     #[error(transparent)]
     Tls(#[from] Error),
 }
 
-/// The client's side of a connection to the server that has this very identity,
-/// under whatever name, from whatever authority and whether or not it has expired.
-/// Asked for a certificate, it shows the same one.
+/// The client's configuration for a server with exactly this identity; name, authority and expiry
+/// do not matter. If the server requires a certificate, the client shows the same one.
+///
+/// # Errors
+///
+/// If the identity is damaged, or its parts do not belong together.
 pub fn pinned(identity: &Identity) -> Result<ClientConfig, PinError> {
     let chain: Vec<_> =
         CertificateDer::pem_slice_iter(identity.chain()).collect::<Result<_, _>>()?;
@@ -44,7 +47,7 @@ pub fn pinned(identity: &Identity) -> Result<ClientConfig, PinError> {
     Ok(config)
 }
 
-/// Believes one certificate.
+/// Accepts exactly one certificate.
 #[derive(Debug)]
 struct Pin {
     expected: CertificateDer<'static>,

@@ -1,4 +1,4 @@
-//! The server's side of TLS, for servers that are not tonic's.
+//! The server's configuration of TLS, for servers other than tonic's.
 
 use std::sync::Arc;
 
@@ -10,7 +10,8 @@ use rustls::{
 
 use crate::{Identity, PinError};
 
-/// A server with this identity that speaks HTTP/1.1 and asks for no certificate.
+/// The configuration of a server with this identity that speaks HTTP/1.1 and requires no client
+/// certificate.
 pub fn server_tls(identity: &Identity) -> Result<ServerConfig, PinError> {
     let chain = CertificateDer::pem_slice_iter(identity.chain()).collect::<Result<_, _>>()?;
     let key = PrivateKeyDer::from_pem_slice(identity.key())?;

@@ -1,4 +1,4 @@
-//! Keeps others from filling the log.
+//! Limits log lines that strangers can cause.
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,8 @@ impl Throttle {
     /// Least time between two lines.
     pub const INTERVAL: Duration = Duration::from_secs(1);
 
-    /// Whether a line is due; if so, how many were withheld since the last one.
+    /// Returns the number of withheld lines since the last one if a line is due, otherwise
+    /// `None`.
     pub fn on_line(&mut self, now: Instant) -> Option<u64> {
         let is_due = |at| now.saturating_duration_since(at) >= Self::INTERVAL;
         if self.logged_at.is_none_or(is_due) {

@@ -1,4 +1,4 @@
-//! Explains connections that fail because of TLS, or of the lack of it.
+//! Explains connections that fail because of TLS, or without it.
 
 use std::{error::Error, io};
 
@@ -6,11 +6,11 @@ use rustls::{AlertDescription, CertificateError, Error as TlsError};
 use time::{OffsetDateTime, format_description::well_known::Rfc3339};
 use tonic::{ConnectError, TimeoutExpired};
 
-/// If an error is one of TLS: what is wrong and what to do about it.
+/// The cause and the next step, if an error comes from TLS.
 pub fn tls_diagnosis(error: &(dyn Error + 'static)) -> Option<String> {
     let mut next = Some(error);
     while let Some(error) = next {
-        // An io::Error shows what it wraps, but not as its source.
+        // An io::Error displays the error that it wraps, but does not return it as its source.
         let wrapped = error
             .downcast_ref::<io::Error>()
             .and_then(io::Error::get_ref)
@@ -23,9 +23,8 @@ pub fn tls_diagnosis(error: &(dyn Error + 'static)) -> Option<String> {
     None
 }
 
-/// Whether a connection was made and broke, which is all that is seen of it when
-/// one side speaks TLS and the other does not, or when the coordinator does not
-/// accept the certificate.
+/// Whether a connection was made and broke. There is no other sign if only one side speaks TLS,
+/// or if the coordinator does not accept the certificate.
 pub(crate) fn is_break(error: &(dyn Error + 'static)) -> bool {
     let mut next = error.source();
     let has_cause = next.is_some();
@@ -38,7 +37,7 @@ pub(crate) fn is_break(error: &(dyn Error + 'static)) -> bool {
     has_cause
 }
 
-/// A day and time for people, of seconds since 1970.
+/// Formats seconds since 1970 as day and time for people.
 pub(crate) fn date(seconds: u64) -> String {
     let seconds = i64::try_from(seconds).unwrap_or(i64::MAX);
     let known = OffsetDateTime::from_unix_timestamp(seconds).ok();
@@ -48,7 +47,7 @@ pub(crate) fn date(seconds: u64) -> String {
 
 fn explain(error: &TlsError) -> String {
     match error {
-        // The latter: by one of the same name and another key.
+        // The latter comes from an authority of the same name with another key.
         TlsError::InvalidCertificate(
             CertificateError::UnknownIssuer | CertificateError::BadSignature,
         ) => "its certificate was signed by none of the authorities in --tls-ca".into(),

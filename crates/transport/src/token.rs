@@ -1,4 +1,4 @@
-//! Tokens: shared secrets that say what a peer may do.
+//! Tokens: shared secrets that determine the rights of a peer.
 
 use std::{
     env, fmt,
@@ -11,7 +11,7 @@ use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 use tonic::metadata::{Ascii, MetadataValue};
 
-/// What stands before a token in the `authorization` header.
+/// The prefix of a token in the `authorization` header.
 pub const BEARER: &str = "Bearer ";
 
 /// Fewest characters: 128 bits, written in hexadecimal.
@@ -19,11 +19,11 @@ const LEN_MIN: usize = 32;
 /// Most characters, so that a header has room for it.
 const LEN_MAX: usize = 1024;
 
-/// A shared secret. Nothing shows it unasked: neither `Debug` nor any error.
+/// A shared secret. Neither `Debug` nor any error shows it.
 #[derive(Clone)]
 pub struct Token(String);
 
-/// Why there is no token.
+/// Why a token cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum TokenError {
     /// The file cannot be read.
@@ -31,18 +31,18 @@ pub enum TokenError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
-    /// What was found is no token.
+    /// The text is not a valid token.
     #[error("{origin} {problem}; `openssl rand -hex 32` makes a good one")]
     Unfit {
-        /// Where it was found.
+        /// The source of the text.
         origin: String,
-        /// What is wrong with it.
+        /// The mistake in it.
         problem: String,
     },
-    /// Two places say what the token is.
+    /// Two sources give a token.
     #[error("both the token file {} and {variable} are given; leave one out", path.display())]
     Ambiguous {
         /// The file.
@@ -53,8 +53,11 @@ pub enum TokenError {
 }
 
 impl Token {
-    /// Checks a token: 32 to 1,024 visible ASCII characters; space around it does
-    /// not count. The problem never quotes it.
+    /// Parses a token: 32 to 1,024 visible ASCII characters; surrounding white space is ignored.
+    ///
+    /// # Errors
+    ///
+    /// The problem of the text, which is never quoted.
     pub fn parse(text: &str) -> Result<Self, String> {
         let token = text.trim_ascii();
         if token.is_empty() {
@@ -72,19 +75,23 @@ impl Token {
         Ok(Self(token.to_owned()))
     }
 
-    /// The token itself, for whoever made it to hand it on.
+    /// The secret itself, for the program that made the token and passes it on.
     pub fn reveal(&self) -> &str {
         &self.0
     }
 
-    /// A secret of 256 bits, in hexadecimal, that follows from the token and says nothing of
-    /// it. `purpose`: what it is for; another purpose gives another secret.
+    /// A secret of 256 bits, in hexadecimal, that is derived from the token and does not reveal
+    /// it. `purpose`: each purpose has a different secret.
     pub fn derived(&self, purpose: &str) -> String {
         let digest = Sha256::new().chain_update(purpose).chain_update([0]).chain_update(&self.0);
         digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The token in a file, or else in an environment variable, if there is any.
+    /// Loads the token from a file, or else from an environment variable, if there is any.
+    ///
+    /// # Errors
+    ///
+    /// If both give a token, if the file cannot be read, or if the token is invalid.
     pub fn load(file: Option<&Path>, variable: &'static str) -> Result<Option<Self>, TokenError> {
         Self::choose(file, variable, env::var_os(variable).map(|v| v.into_encoded_bytes()))
     }
@@ -110,8 +117,8 @@ impl Token {
         Self::parse(&text).map(Some).map_err(|problem| TokenError::Unfit { origin, problem })
     }
 
-    /// Whether this is what a peer presents. Takes the same time wherever the two
-    /// differ; only whether their lengths are equal can be learnt from it.
+    /// Whether a peer presents this token. Takes the same time wherever the two differ; the time
+    /// reveals only whether their lengths are equal.
     pub fn matches(&self, presented: &[u8]) -> bool {
         self.0.as_bytes().ct_eq(presented).into()
     }
@@ -138,7 +145,7 @@ impl fmt::Debug for Token {
     }
 }
 
-/// A file's start: no token is longer, and `/dev/zero` has no end.
+/// Reads the start of a file: no token is longer, and `/dev/zero` has no end.
 fn read_start(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(2 * LEN_MAX as u64).read_to_end(&mut bytes)?;

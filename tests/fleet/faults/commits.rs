@@ -8,15 +8,15 @@ use super::{GENERATIONS, TINY, resumed_at};
 
 const SIGABRT: i32 = 6;
 
-/// Waits until the coordinator has died where it was told to.
+/// Waits until the coordinator has died at the given step.
 fn wait_for_death(coordinator: &mut CoordinatorProcess, step: &str) {
     let status = coordinator.process.wait();
     assert_eq!(status.signal(), Some(SIGABRT), "it died by itself");
     coordinator.process.wait_for("last words", |line| line["step"] == step);
 }
 
-/// A coordinator that dies when it reaches a step for the `passage`-th time has
-/// committed `n_committed` generations, and goes on from there.
+/// A coordinator that dies at the `passage`-th time of a step has committed `n_committed`
+/// generations, and continues from there.
 fn dies_and_goes_on(step: &str, passage: u64, n_committed: u64) {
     let mut coordinator = CoordinatorProcess::start_armed(&format!("kill {step} {passage}"));
     let _workers = WorkerProcess::start_many(&coordinator, 2);

@@ -13,8 +13,7 @@ fn a_coordinator_killed_within_a_generation_evaluates_it_again() {
     let id = MANY.submit(&coordinator);
     let watch = coordinator.watch(id);
 
-    // More assignments than the first ones: results have come in, others are
-    // out.
+    // Later assignments than the first ones: some results have arrived, others are outstanding.
     let (n_seen, _) = wait_for_assignment(&coordinator, 3);
     let is_later = |line: &LogLine| line["message"] == "items assigned" && line["generation"] == 3;
     let (n_seen, _) = coordinator.process.find(n_seen, "second assignment", is_later);
@@ -28,9 +27,9 @@ fn a_coordinator_killed_within_a_generation_evaluates_it_again() {
     assert!(!coordinator.process.lines().iter().any(is_evaluated), "the kill came within it");
 
     coordinator.restart();
-    // Or at the one before, whose commit may have been under way.
+    // Or at the previous one, whose commit may have been in progress.
     assert!((2..=3).contains(&resumed_at(&coordinator)));
-    // The workers and the watching client have come back by themselves.
+    // The workers and the watching client have reconnected by themselves.
     MANY.assert_undisturbed(watch);
 }
 
@@ -41,8 +40,8 @@ fn a_coordinator_killed_while_it_commits_a_generation_evaluates_it_again() {
     let id = SMALL.submit(&coordinator);
     coordinator.wait_for_generation(1);
 
-    // Whoever holds the database's write lock keeps the coordinator between two
-    // generations: all evaluated, nothing in flight, nothing committed.
+    // Holding the database's write lock keeps the coordinator between two generations: all
+    // evaluated, nothing in flight, nothing committed.
     let database = coordinator.database();
     database.busy_timeout(Duration::from_secs(60)).unwrap();
     database.execute_batch("BEGIN IMMEDIATE").unwrap();
@@ -110,7 +109,7 @@ fn eight_workers_come_back_by_themselves_to_a_killed_coordinator() {
     }
 
     coordinator.restart();
-    // Generation 1 was perhaps not stored yet when generation 2 was handed out.
+    // Generation 1 may not have been stored yet when generation 2 was assigned.
     assert!(resumed_at(&coordinator) >= 1);
     for worker in &workers {
         coordinator.process.wait_for("return", |line| {
@@ -127,7 +126,7 @@ fn a_frozen_coordinator_does_not_blame_its_workers() {
     let id = SMALL.submit(&coordinator);
     wait_for_assignment(&coordinator, 1);
     coordinator.process.signal("STOP");
-    // This is the fault, not a way to wait for something.
+    // This pause is the fault itself, not a way of waiting.
     thread::sleep(Duration::from_millis(2500));
     coordinator.process.signal("CONT");
     SMALL.assert_undisturbed(coordinator.watch(id));

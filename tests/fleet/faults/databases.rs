@@ -1,4 +1,5 @@
-//! Databases that must not be used: refused with one line, and left as they are.
+//! Databases that must not be used: the coordinator refuses them with one line, and leaves them
+//! alone.
 
 use std::{
     collections::BTreeMap,
@@ -23,13 +24,13 @@ fn data_directory() -> TempDir {
     let id = TINY.submit(&coordinator);
     TINY.assert_undisturbed(coordinator.watch(id));
     coordinator.process.kill();
-    // Everything into the one file.
+    // Moves everything into the main file.
     let database = Connection::open(directory.path().join(DATABASE)).unwrap();
     database.execute_batch("PRAGMA wal_checkpoint(TRUNCATE)").unwrap();
     directory
 }
 
-/// The files that hold data; the lock does not, nor does the shared memory.
+/// The files with data, without the lock and the shared memory.
 fn contents(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let paths = fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path());
     let has_data =
@@ -84,7 +85,7 @@ fn a_damaged_database_is_refused_untouched() {
 fn a_database_of_a_newer_version_is_refused_untouched() {
     let directory = data_directory();
     let database = Connection::open(directory.path().join(DATABASE)).unwrap();
-    // Its log, which nobody has moved into the file yet, must stay, too.
+    // Its log, which is not in the main file yet, must stay, too.
     database.pragma_update(None, "wal_autocheckpoint", 0).unwrap();
     database.pragma_update(None, "user_version", 1000).unwrap();
     let copy = tempfile::tempdir().unwrap();
@@ -113,7 +114,7 @@ fn a_database_of_another_program_is_refused_untouched() {
 #[test]
 fn a_sound_database_is_used_whatever_is_beside_it() {
     let directory = data_directory();
-    // What is left of a first start that was killed, and a stale lock file.
+    // The remains of a first start that was killed, and a stale lock file.
     fs::write(directory.path().join("swarmevo.sqlite3.new"), "half a datab").unwrap();
     let mut lock = fs::File::create(directory.path().join("swarmevo.lock")).unwrap();
     lock.seek(SeekFrom::Start(0)).unwrap();

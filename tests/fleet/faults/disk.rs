@@ -1,11 +1,10 @@
-//! Disks that are full or read-only, and databases that refuse a write for good.
+//! Disks that are full or read-only, and databases that refuse a write permanently.
 
 use harness::{CoordinatorProcess, LogLine, SmallDisk, WorkerProcess, run_coordinator, skipped};
 
 use super::{OTHER, TINY, wait_for_assignment};
 
-/// A disk that can be filled; without the privilege to mount one, the test is
-/// skipped.
+/// A disk that the test can fill; without the privilege to mount one, the test is skipped.
 fn small_disk() -> Option<SmallDisk> {
     let disk = SmallDisk::mount(2 << 20);
     if disk.is_none() {
@@ -33,12 +32,12 @@ fn on_a_full_disk_an_experiment_waits_and_goes_on_by_itself() {
     let (n_seen, _) = coordinator.process.find(0, "complaint", waits);
     coordinator.process.find(n_seen, "second attempt", waits);
 
-    // Whoever submits now is told what is wrong, and not that nobody is there.
+    // A client that submits now gets the reason, and not the error of an absent coordinator.
     let refused = coordinator.swarmctl(&["submit", (TINY.make)().path().to_str().unwrap()]);
     assert_eq!(refused.code, Some(1), "{refused:#?}");
     assert!(refused.stderr.contains("disk is full"), "{}", refused.stderr);
     assert!(!refused.stderr.contains("cannot reach"), "{}", refused.stderr);
-    // What only reads works.
+    // Commands that only read work.
     let list = coordinator.swarmctl(&["list"]).expect_success().json();
     assert_eq!(list.as_array().unwrap().len(), 1);
     assert_eq!(list[0]["state"], "running");
@@ -121,7 +120,7 @@ fn an_end_that_cannot_be_stored_is_stored_once_it_can() {
              BEGIN SELECT raise(ABORT, 'as the test wants it'); END",
         )
         .unwrap();
-    // Its client is not kept waiting for long, and not told that nobody is there.
+    // Its client does not wait for long, and does not get the error of an absent coordinator.
     let cancelled = coordinator.swarmctl(&["cancel", &id.to_string()]);
     assert_eq!(cancelled.code, Some(1), "{cancelled:#?}");
     assert!(cancelled.stderr.contains("did not store the change"), "{}", cancelled.stderr);

@@ -1,4 +1,4 @@
-//! Data directories that somebody else edits, or uses at the same time.
+//! Data directories that another program edits, or uses at the same time.
 
 use std::fs;
 
@@ -31,7 +31,7 @@ fn an_experiment_whose_configuration_was_edited_waits_for_a_person_and_the_other
     let write = "UPDATE experiments SET config = ?2 WHERE id = ?1";
     let original: String =
         coordinator.database().query_row(read, [edited], |row| row.get(0)).unwrap();
-    // Another seed, and the same everywhere else.
+    // Changes the seed, and nothing else.
     let changed = original.replace("\"seed\":7", "\"seed\":6");
     assert_ne!(changed, original);
     edit_and_restart(&mut coordinator, |database| {
@@ -54,7 +54,7 @@ fn an_experiment_whose_configuration_was_edited_waits_for_a_person_and_the_other
     assert_eq!(refused.code, Some(3), "{refused:#?}");
     assert!(refused.stderr.contains("its configuration is not"), "{}", refused.stderr);
 
-    // Once it is as it was, it continues, even without a restart.
+    // Once the row is restored, the experiment continues, even without a restart.
     coordinator.database().execute(write, params![edited, original]).unwrap();
     coordinator.swarmctl(&["resume", &id]).expect_success();
     TINY.assert_undisturbed(coordinator.watch(edited));
@@ -67,7 +67,7 @@ fn an_experiment_whose_checkpoint_was_edited_does_not_come_to_another_digest() {
     let id = TINY.submit(&coordinator);
     coordinator.wait_for_generation(1);
     edit_and_restart(&mut coordinator, |database| {
-        // A bit of a number: still a valid evolution.
+        // Changes a bit of a number, which is still a valid evolution.
         let read = "SELECT state FROM keyframes";
         let mut state: Vec<u8> = database.query_row(read, [], |row| row.get(0)).unwrap();
         state[40] ^= 1;
@@ -77,7 +77,7 @@ fn an_experiment_whose_checkpoint_was_edited_does_not_come_to_another_digest() {
     let reason = wait_for_pause(&coordinator);
     assert!(reason.contains("its checkpoint"), "{reason}");
     let n_committed = coordinator.n_committed(id);
-    // The next start says the same, and nothing has happened meanwhile.
+    // The next start reports the same, and nothing has changed since.
     coordinator.process.kill();
     coordinator.restart();
     assert_eq!(wait_for_pause(&coordinator), reason);
@@ -105,7 +105,7 @@ fn a_coordinator_that_loses_its_database_to_another_stops_and_fails_nothing() {
     let _workers = WorkerProcess::start_many(&coordinator, 2);
     let id = TINY.submit(&coordinator);
     coordinator.wait_for_generation(1);
-    // What a coordinator on another machine, whose locks do not reach here, does first.
+    // The first step of a coordinator on another machine, whose locks do not reach this one.
     let claim = "UPDATE identity SET owner = randomblob(16)";
     coordinator.database().execute(claim, []).unwrap();
     assert_eq!(coordinator.process.wait().code(), Some(3));
@@ -130,7 +130,7 @@ fn a_coordinator_whose_database_breaks_stops_and_fails_nothing() {
     let workers = WorkerProcess::start_many(&coordinator, 2);
     let id = TINY.submit(&coordinator);
     coordinator.wait_for_generation(0);
-    // The table of events is where no page is.
+    // The table of events points to a page that does not exist.
     let database = coordinator.database();
     let root = "SELECT rootpage FROM sqlite_schema WHERE name = 'events'";
     let sound: u64 = database.query_row(root, [], |row| row.get(0)).unwrap();

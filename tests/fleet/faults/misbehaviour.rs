@@ -1,4 +1,4 @@
-//! Workers that do not keep to the protocol, or die of what they are given.
+//! Workers that violate the protocol, or die of their items.
 
 use std::{
     collections::BTreeMap,
@@ -23,10 +23,10 @@ use tonic_prost::ProstCodec;
 
 use super::{OTHER, TINY, n_lost};
 
-/// Enough for each intruder to find work.
+/// Enough generations for each intruder to find work.
 const GENERATIONS: u64 = 6;
 
-/// A worker in the middle of an experiment, with items in its hands.
+/// A worker in the middle of an experiment, with items.
 struct Intruder {
     worker: HandWorker,
     experiment: sim_core::Simulation,
@@ -48,7 +48,7 @@ impl Intruder {
         Self { worker, experiment, trial_set, assignments: batch.assignments }
     }
 
-    /// What the first of its items is worth.
+    /// The true fitness of its first item.
     fn honest_fitness(&self) -> Vec<f64> {
         evaluate(&self.experiment, self.trial_set, &self.assignments[0])
     }
@@ -69,7 +69,7 @@ impl Intruder {
         }
     }
 
-    /// Leaves without harm; all it has said before has been read by then.
+    /// Leaves without harm, after the coordinator has read all its messages.
     async fn leave(self, coordinator: &CoordinatorProcess, name: &str) {
         self.worker.say(Message::Draining(Draining {})).await;
         self.worker.hang_up().await;
@@ -114,8 +114,8 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
     let experiment = Experiment::tiny(GENERATIONS);
     let id = coordinator.submit(&experiment.path());
 
-    // Wrong sizes, whatever the values. It has the fleet for itself: with others at
-    // work its items might be theirs, too, and be called off before it answers.
+    // Wrong sizes, with any values. It is the only worker: others might get copies of its items,
+    // and the coordinator would recall them before the answer.
     let wrong: [fn(usize) -> Vec<f64>; 4] = [
         |_| vec![],
         |n_trials| vec![f64::NAN; n_trials + 1],
@@ -140,7 +140,7 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
         Intruder::join(&url, &name).await.complete_generation(&coordinator, &name).await;
     }
 
-    // Results for every item there is, except its own.
+    // Results for all items except its own.
     let intruder = Intruder::join(&url, "greedy").await;
     let own: Vec<u64> =
         intruder.assignments.iter().map(|assignment| assignment.assignment_id).collect();
@@ -158,7 +158,7 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
     intruder.worker.answer_fitness(first, wrong).await;
     intruder.leave(&coordinator, "repetitive").await;
 
-    // Out of turn.
+    // Messages out of order.
     let intruder = Intruder::join(&url, "polite").await;
     intruder.worker.say(Message::Hello(hello())).await;
     assert_eq!(reason_of_loss(&coordinator, "polite"), "it said Hello twice");
@@ -175,13 +175,13 @@ async fn streams_that_are_not_the_protocol_are_ended_and_the_others_go_on() {
     let url = coordinator.url();
     let id = TINY.submit(&coordinator);
 
-    // No gRPC at all. HTTP/2 says goodbye and closes.
+    // Bytes that are not gRPC. The HTTP/2 server says goodbye and closes.
     let mut raw = TcpStream::connect(coordinator.address()).unwrap();
     raw.write_all(&[0x5a; 4096]).unwrap();
     let mut answer = Vec::new();
     let _ = raw.read_to_end(&mut answer);
 
-    // Not this service's messages: what should be an introduction is text.
+    // A wrong message: text instead of an introduction.
     let channel = Endpoint::from_shared(url.clone()).unwrap().connect().await.unwrap();
     let mut client = tonic::client::Grpc::new(channel);
     client.ready().await.unwrap();
@@ -192,13 +192,13 @@ async fn streams_that_are_not_the_protocol_are_ended_and_the_others_go_on() {
     let status = client.streaming(request, path, codec).await.unwrap_err();
     assert_eq!(status.code(), Code::Internal, "{status}");
 
-    // A first message that is no introduction.
+    // A first message that is not an introduction.
     let mut client = WorkerServiceClient::connect(url.clone()).await.unwrap();
     let message = Some(Message::Heartbeat(Heartbeat {}));
     let status = client.work(tokio_stream::iter([WorkRequest { message }])).await.unwrap_err();
     assert_eq!(status.code(), Code::InvalidArgument);
 
-    // A message that is too long. What its worker held goes to others.
+    // A message that is too long. Its worker's items go to others.
     let mut intruder = Intruder::join(&url, "talkative").await;
     let values = vec![0.0; 3 << 20];
     intruder.worker.answer_fitness(intruder.assignments[0].assignment_id, values).await;
@@ -209,17 +209,16 @@ async fn streams_that_are_not_the_protocol_are_ended_and_the_others_go_on() {
     TINY.assert_undisturbed(coordinator.watch(id));
 }
 
-/// The first experiment, its second generation.
+/// The second generation of the first experiment.
 const POISONED: (u64, TrialSet) = (1, TrialSet::Generation(1));
 
-/// A worker that computes honestly, and dies whenever it gets to the genotype that
-/// was the first of [`POISONED`].
+/// A worker that computes honestly, and dies at the first genotype of [`POISONED`].
 async fn die_of(poison: Arc<OnceLock<Vec<f64>>>, url: String, name: String) {
     loop {
         let hello = Hello { name: name.clone(), ..hello() };
         let Ok(mut worker) = HandWorker::connect(&url, hello).await else { return };
         serve_until_poisoned(&mut worker, &poison).await;
-        // What it has said is heard: only the item of which it dies is to blame.
+        // The coordinator reads its earlier messages, so only the deadly item is to blame.
         worker.hang_up().await;
     }
 }
@@ -263,7 +262,7 @@ async fn a_genotype_that_takes_every_worker_down_is_computed_by_the_coordinator(
     // The genotype does no harm to the coordinator's own process.
     TINY.assert_undisturbed(coordinator.watch(poisoned));
     let n_lost = n_lost(&coordinator);
-    // Each of two trials may be an item of its own; the referee is asked at its third loss at the
-    // latest, and copies that all three workers lose within a second are one loss.
+    // Each of two trials may be an item of its own. The referee computes an item at its third
+    // loss at the latest; losses of copies within one second count once.
     assert!((2..=2 * 3 * 3).contains(&n_lost), "{n_lost}: no more than it takes");
 }

@@ -1,5 +1,4 @@
-//! Networks that break and fall silent, for longer and for shorter than the
-//! lease.
+//! Networks that break or fall silent, for longer and for shorter than the lease.
 
 use harness::{
     CoordinatorProcess,
@@ -9,8 +8,7 @@ use harness::{
 
 use super::{SMALL, n_lost, wait_for_assignment, wait_for_loss};
 
-/// A coordinator and its only worker, at work on the experiment, with a network
-/// between them.
+/// A coordinator and its only worker, which compute the experiment, with a network between them.
 struct Scene {
     coordinator: CoordinatorProcess,
     network: Proxy,
@@ -63,7 +61,7 @@ fn a_network_that_is_dead_for_longer_than_the_lease_is_survived() {
     scene.network.hold(ToWorker);
     scene.network.hold(ToCoordinator);
     assert_eq!(wait_for_loss(&scene.coordinator)["reason"], "silent for 1 s");
-    // That it was dropped, the worker learns when the network is back.
+    // The worker learns that it was dropped when the network is back.
     scene.network.wait_for("withheld word", |traffic| traffic.n_held.iter().all(|&n| n > 0));
     assert_eq!(scene.network.traffic().n_connections, 1);
     scene.network.heal();
@@ -76,8 +74,8 @@ fn a_worker_that_hears_nothing_for_longer_than_its_lease_keeps_its_place() {
     let scene = Scene::start(&["--lease", "1"]);
     scene.network.hold(ToWorker);
     let before = scene.network.traffic().n_delivered[ToCoordinator as usize];
-    // At five heartbeats per lease, and with the results of what it had, this is
-    // more than a lease.
+    // At five heartbeats per lease, and with its remaining results, this takes longer than a
+    // lease.
     scene.network.wait_for("heartbeats", |traffic| {
         traffic.n_delivered[ToCoordinator as usize] > before + 12
     });

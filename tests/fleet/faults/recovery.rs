@@ -20,7 +20,7 @@ fn recover(directory: &Path, to: &Path) -> Value {
     on(directory, "doctor", &[Path::new("--recover"), to]).expect_success().json()
 }
 
-/// Stops a coordinator by force, and moves everything into its main file.
+/// Kills a coordinator, and moves all data into its main file.
 fn stop(coordinator: &mut CoordinatorProcess) -> Vec<u8> {
     coordinator.process.kill();
     let database = coordinator.database();
@@ -43,7 +43,7 @@ fn a_backup_of_a_running_experiment_continues_elsewhere_to_the_same_bits() {
     assert!((2..6).contains(&n_copied), "in the middle of the run: {made}");
     let names = fs::read_dir(&to).unwrap().map(|entry| entry.unwrap().file_name());
     assert_eq!(names.collect::<Vec<_>>(), [DATABASE], "the copy is one file");
-    // The original goes on, and is lost.
+    // The original continues after the backup, and is then lost.
     coordinator.wait_for_generation(n_copied);
     coordinator.process.kill();
 
@@ -51,7 +51,7 @@ fn a_backup_of_a_running_experiment_continues_elsewhere_to_the_same_bits() {
     assert_eq!(resumed_at(&restored), n_copied);
     let _workers = WorkerProcess::start_many(&restored, 2);
     SMALL.assert_undisturbed(restored.watch(id));
-    // One more is refused as long as this one is there.
+    // Another target is refused while this one exists.
     let again = on(coordinator.data_dir(), "backup", &[&to]);
     assert_eq!(again.code, Some(2), "{again:#?}");
     assert!(again.stderr.contains("exists already; choose another name"), "{}", again.stderr);
@@ -63,7 +63,7 @@ fn a_copy_of_a_database_in_use_without_its_log_is_not_taken_for_the_whole() {
     let workers = WorkerProcess::start_many(&coordinator, 2);
     let id = SMALL.submit(&coordinator);
     coordinator.wait_for_generation(0);
-    // Stopped and started, it has something in its main file.
+    // After a restart, the main file has data.
     coordinator.process.signal("TERM");
     assert_eq!(coordinator.process.wait().code(), Some(0));
     coordinator.restart();
@@ -91,9 +91,9 @@ fn a_copy_of_a_database_in_use_without_its_log_is_not_taken_for_the_whole() {
     SMALL.assert_undisturbed(restored.watch(id));
 }
 
-/// A database with a completed and a running experiment of which a page is overwritten, or a
-/// tenth is cut off: each experiment that is not lost comes to the digest
-/// of an undisturbed run.
+/// A database with a completed and a running experiment, in which a page is overwritten, or from
+/// which a tenth is cut off: every experiment that is not lost ends with the digest of an
+/// undisturbed run.
 fn is_recovered(damage: impl FnOnce(&mut Vec<u8>)) {
     let mut coordinator = CoordinatorProcess::start();
     let workers = WorkerProcess::start_many(&coordinator, 2);
@@ -152,7 +152,7 @@ fn is_recovered(damage: impl FnOnce(&mut Vec<u8>)) {
 #[test]
 fn a_database_with_a_damaged_page_is_recovered() {
     is_recovered(|bytes| {
-        // One that all of the history is found by.
+        // A page through which SQLite finds the whole history.
         let page = root_page(bytes, "generations");
         bytes[(page - 1) * PAGE..page * PAGE].fill(0xa5);
     });

@@ -1,5 +1,5 @@
-//! Workers that fail, lie, hang and crash in loops beside honest ones: nothing ends, and
-//! not a bit changes.
+//! Workers that fail, lie, hang and crash in loops beside honest ones: no experiment ends, and no
+//! bit changes.
 
 use std::{
     sync::{
@@ -18,7 +18,7 @@ use swarm_proto::v1::{
 
 use super::{OTHER, SMALL, TINY};
 
-/// What a worker says to an assignment; none if it says nothing.
+/// A worker's answer to an assignment; `None` for no answer.
 type Conduct = fn(&Assignment) -> Option<ItemResult>;
 
 fn fails(assignment: &Assignment) -> Option<ItemResult> {
@@ -41,7 +41,7 @@ fn hangs(_: &Assignment) -> Option<ItemResult> {
     None
 }
 
-/// A worker that is there for ever, and comes back when it is thrown out.
+/// A worker that stays for ever, and reconnects whenever it is dropped.
 fn spawn_worker(coordinator: &CoordinatorProcess, name: &str, slots: u32, conduct: Conduct) {
     let (url, hello) = (coordinator.url(), Hello { name: name.to_owned(), slots, ..hello() });
     tokio::spawn(async move {
@@ -68,7 +68,7 @@ fn wait_until_joined(coordinator: &CoordinatorProcess, name: &str) {
         .wait_for("worker", |line| line["message"] == "worker joined" && line["name"] == name);
 }
 
-/// Names of the workers that were found to be faulty, and the reasons.
+/// Names of the workers in quarantine, and the reasons.
 fn quarantined(coordinator: &CoordinatorProcess) -> Vec<(String, String)> {
     let lines = coordinator.process.lines();
     let faulty = lines.iter().filter(|line| {
@@ -151,7 +151,7 @@ async fn a_liar_stays_in_quarantine_through_pauses_and_restarts_until_it_is_read
     assert!(again.stderr.contains("no worker \"liar\" is in quarantine"), "{}", again.stderr);
 }
 
-/// An item takes longer than a worker lives.
+/// An item takes longer than the worker lives.
 #[test]
 fn a_worker_killed_again_and_again_before_it_finishes_an_item_fails_nothing() {
     let experiment = Experiment::small(1).edit(|value| {
@@ -171,7 +171,7 @@ fn a_worker_killed_again_and_again_before_it_finishes_an_item_fails_nothing() {
             while !is_over.load(Relaxed) {
                 let mut worker = WorkerProcess::start(&coordinator, "mortal");
                 n_kills += 1;
-                // Its life is counted from the moment at which it could compute.
+                // Its life begins when it can compute.
                 let joined = |line: &harness::LogLine| line["message"] == "worker joined";
                 n_seen = coordinator.process.find(n_seen, "the worker", joined).0;
                 thread::park_timeout(LIFE);
@@ -199,8 +199,8 @@ fn workers_that_are_all_killed_at_once_while_copies_of_items_are_with_several_fa
         for frozen in &workers[..2] {
             frozen.process.signal("STOP");
         }
-        // Once a generation is not complete although the others get nothing more of it, they
-        // have copies of what those two hold.
+        // When a generation is incomplete although the others get no more items, they have copies
+        // of the items of these two.
         let n_seen = coordinator.process.lines().len();
         coordinator.process.find(n_seen, "more work", |line| line["message"] == "items assigned");
         for worker in &mut workers {

@@ -10,7 +10,7 @@ fn a_worker_killed_within_a_generation_costs_nothing_but_time() {
     let mut workers = WorkerProcess::start_many(&coordinator, 3);
     let id = SMALL.submit(&coordinator);
 
-    // It has just been given items that take it tens of milliseconds.
+    // It has just got items that take tens of milliseconds.
     let (_, assigned) = wait_for_assignment(&coordinator, 2);
     let joined = coordinator.process.wait_for("that worker's name", |line| {
         line["message"] == "worker joined" && line["worker"] == assigned["worker"]
@@ -67,7 +67,7 @@ fn a_worker_frozen_for_longer_than_its_lease_comes_back() {
     assert_eq!(lost["reason"], "silent for 1 s");
     assert!(lost["items_requeued"].as_u64().unwrap() > 0, "it had work: {lost}");
 
-    // Thawed, it delivers what nobody waits for any more, and is told so.
+    // After thawing, it delivers late results, learns that it was dropped, and reconnects.
     worker.process.signal("CONT");
     coordinator.process.wait_for("return", |line| {
         line["message"] == "worker joined" && line["worker"] != lost["worker"]

@@ -1,4 +1,4 @@
-//! A connection that breaks when it has to go, and when its peer stops reading.
+//! Connections that end when they have to make room, and when their peer stops reading.
 
 use std::{
     fmt, io,
@@ -15,20 +15,20 @@ use tonic::transport::server::Connected;
 
 use super::places::{Peer, Places};
 
-/// A connection that breaks unless it is admitted in time, when it has to make room, and
-/// when its peer does not read.
+/// A connection that ends if it is not admitted in time, if it has to make room, or if its peer
+/// does not read.
 pub struct Connection<IO> {
     io: IO,
     peer: Peer,
     has_to_go: Pin<Box<dyn Future<Output = ()> + Send>>,
     is_heard: bool,
-    /// While a write waits for the peer: when it has waited for too long.
+    /// The time limit of a write that waits for the peer.
     stall: Option<Pin<Box<Sleep>>>,
     places: Places,
 }
 
 impl<IO> Connection<IO> {
-    /// Returns, too, whether another had to make room.
+    /// Takes a place for a connection. Also returns whether another one had to make room.
     pub(super) fn new(io: IO, address: SocketAddr, places: &Places) -> (Self, bool) {
         let (peer, has_ended_another) = places.enter(address);
         let has_to_go = Box::pin(peer.clone().has_to_go());
@@ -37,7 +37,7 @@ impl<IO> Connection<IO> {
         (connection, has_ended_another)
     }
 
-    /// Who is at the other end.
+    /// The peer at the other end.
     pub fn peer(&self) -> &Peer {
         &self.peer
     }
@@ -46,7 +46,7 @@ impl<IO> Connection<IO> {
     fn poll_end(&mut self, context: &mut Context<'_>) -> io::Result<()> {
         match self.has_to_go.as_mut().poll(context) {
             Poll::Ready(()) => {
-                // It stays ready.
+                // The future stays ready.
                 self.has_to_go = Box::pin(std::future::ready(()));
                 Err(io::ErrorKind::TimedOut.into())
             }
@@ -54,7 +54,7 @@ impl<IO> Connection<IO> {
         }
     }
 
-    /// What becomes of a write, if the peer does not read.
+    /// Ends a write if the peer does not read for too long.
     fn unless_stalled<T>(
         &mut self,
         written: Poll<io::Result<T>>,
@@ -91,8 +91,8 @@ impl<IO: AsyncRead + Unpin> AsyncRead for Connection<IO> {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        // A server of gRPC always waits for something to read, so this is polled when the
-        // time is up. A server of HTTP/1 may not: `serve_http` looks for itself, too.
+        // A gRPC server always waits for input, so it polls this when the time is up. An HTTP/1
+        // server may not, so `serve_http` also checks by itself.
         self.poll_end(context)?;
         let n_before = buffer.filled().len();
         let read = Pin::new(&mut self.io).poll_read(context, buffer);

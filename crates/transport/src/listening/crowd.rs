@@ -1,8 +1,8 @@
-//! Connections that share a limited number of places, and that have to go, one at a time,
-//! when others come. Synchronous.
+//! Connections that share a limited number of places. When a further one arrives, one of them has
+//! to go. Synchronous.
 //!
-//! The one that goes belongs to the peer with the most connections, so that nobody is kept
-//! out by one machine; among those, one that has said nothing goes first, then the oldest.
+//! The one that goes belongs to the peer with the most connections, so that a single machine
+//! cannot keep others out. Among that peer's connections, silent ones go first, then the oldest.
 
 use std::{
     cmp::Reverse,
@@ -18,15 +18,15 @@ use tokio_util::sync::CancellationToken;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct MemberId(u64);
 
-/// How many connections there are at the same time, and for how long each is safe.
+/// The number of places, and the time for which each connection is safe.
 #[derive(Debug, Clone, Copy)]
 pub struct Room {
-    /// Connections at the same time: one more ends another.
+    /// Number of simultaneous connections; a further one ends another.
     pub n_places: usize,
-    /// Time that each connection has at least to say something.
+    /// Time that each connection has at least to send something.
     pub silent_grace: Duration,
-    /// Time that each has at least if it says something. If all are younger, more wait in
-    /// the system's queue: so a whole fleet that comes back at once gets in.
+    /// Time that each connection has at least if it sends something. If all are younger, further
+    /// ones wait in the system's queue, so a whole fleet that reconnects at once gets in.
     pub heard_grace: Duration,
 }
 
@@ -52,8 +52,8 @@ impl Crowd {
         Self { room, members: BTreeMap::new(), n_of_peer: BTreeMap::new(), n_seen: 0 }
     }
 
-    /// How long the next one has to wait for a place: until one of those with the most
-    /// connections has had its time.
+    /// Time until the next connection can get a place: until a connection of the peer with the
+    /// most connections has had its time.
     pub fn time_to_place(&self, now: Instant) -> Duration {
         if self.members.len() < self.room.n_places {
             return Duration::ZERO;
@@ -72,7 +72,8 @@ impl Crowd {
         grace.saturating_sub(now.saturating_duration_since(member.since))
     }
 
-    /// One comes. `has_to_go` tells it when it has to go. Returns whether another had to.
+    /// Adds a connection. Cancelling `has_to_go` tells it to go. Returns whether another one had
+    /// to go.
     pub fn enter(
         &mut self,
         now: Instant,
@@ -99,26 +100,26 @@ impl Crowd {
             let n = self.n_of_peer.get(&member.peer);
             (n, self.time_left(member, now).is_zero(), !member.is_heard, Reverse(member.since))
         };
-        // Of equals `min_by_key` takes the first, which came first.
+        // Among equals, `min_by_key` takes the first, which is the oldest.
         let first = self.members.iter().min_by_key(|(_, member)| Reverse(order(member)));
         first.map(|(id, _)| *id)
     }
 
-    /// One has said something, for the first time.
+    /// A connection has sent its first bytes.
     pub fn on_heard(&mut self, id: MemberId) {
         if let Some(member) = self.members.get_mut(&id) {
             member.is_heard = true;
         }
     }
 
-    /// One has made a request: it is as good as new.
+    /// A connection has made a request, so its time starts again.
     pub fn on_request(&mut self, id: MemberId, now: Instant) {
         if let Some(member) = self.members.get_mut(&id) {
             (member.is_heard, member.since) = (true, now);
         }
     }
 
-    /// One has gone, or is not counted here any more.
+    /// A connection has gone, or no longer counts here.
     pub fn leave(&mut self, id: MemberId) {
         let Some(member) = self.members.remove(&id) else { return };
         if let Some(n) = self.n_of_peer.get_mut(&member.peer) {
@@ -130,7 +131,8 @@ impl Crowd {
     }
 }
 
-/// Whose connections count together: a machine has a whole network of addresses in IPv6.
+/// The network whose connections count together: in IPv6, a machine has a whole network of
+/// addresses.
 fn network_of(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V4(address) => address.into(),
@@ -152,7 +154,7 @@ mod tests {
         IpAddr::from([10, 0, 0, last])
     }
 
-    /// As many as there are places for, since `now`.
+    /// A crowd with a connection in every place, all since `now`.
     fn full(now: Instant) -> (Crowd, Vec<(MemberId, CancellationToken)>) {
         let mut crowd = Crowd::new(ROOM);
         let enter = |_| {

@@ -1,5 +1,5 @@
-//! Serves HTTP/1.1 on the connections of a listener, with time limits on whatever a peer
-//! can be slow with.
+//! Serves HTTP/1.1 on the connections of a listener, with time limits for every step at which a
+//! peer can be slow.
 
 use std::{convert::Infallible, error::Error, sync::Arc, time::Duration};
 
@@ -19,21 +19,21 @@ use tokio_util::{either::Either, sync::CancellationToken};
 
 use super::{Connection, ListenerLimits, Peer, TLS_HANDSHAKE_TIMEOUT, accept};
 
-/// What a request may take.
+/// Limits of requests.
 #[derive(Debug, Clone, Copy)]
 pub struct HttpLimits {
     /// Time for the headers of a request, and between two requests on a connection.
     pub headers_time: Duration,
     /// Bytes of a request's headers.
     pub headers_len: usize,
-    /// How many headers there may be.
+    /// Most headers of a request.
     pub n_headers: usize,
-    /// Whether a connection has more than one request.
+    /// Whether a connection may have more than one request.
     pub keep_alive: bool,
 }
 
-/// Serves until `shutdown`, and then what has begun; dropping the future ends that, too.
-/// `answer` is told who asks, and admits whom it permits to ask.
+/// Serves until `shutdown`, and then finishes open requests; dropping the future ends these, too.
+/// `answer` gets the peer with each request, and admits permitted peers.
 pub async fn serve_http<S, F, B>(
     listener: TcpListener,
     limits: (ListenerLimits, HttpLimits),
@@ -69,7 +69,8 @@ pub async fn serve_http<S, F, B>(
     }
 }
 
-/// All requests of a connection. Whoever breaks off, or talks nonsense, gets no answer.
+/// Serves all requests of a connection. A peer that breaks off, or sends invalid data, gets no
+/// answer.
 async fn talk<F, B>(
     connection: Connection<TcpStream>,
     tls: Option<TlsAcceptor>,
@@ -84,7 +85,7 @@ async fn talk<F, B>(
         None => Either::Left(connection),
         Some(tls) => match timeout(TLS_HANDSHAKE_TIMEOUT, tls.accept(connection)).await {
             Ok(Ok(stream)) => Either::Right(Box::new(stream)),
-            // Whoever it was did not speak TLS.
+            // The peer does not speak TLS.
             Ok(Err(_)) | Err(_) => return,
         },
     };
@@ -108,6 +109,6 @@ async fn talk<F, B>(
             conversation.await
         }
     };
-    // There is nobody to be told.
+    // The peer has gone.
     drop(ended);
 }

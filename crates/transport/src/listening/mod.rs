@@ -1,5 +1,5 @@
-//! The one accept loop of all servers: a limited number of connections, and none for long
-//! that has no business here.
+//! The accept loop of all servers, with a limited number of connections, and little time for
+//! unauthorised ones.
 
 mod connection;
 mod crowd;
@@ -25,46 +25,47 @@ pub use places::{Peer, TooManyConnections};
 use crate::Throttle;
 use places::Places;
 
-/// Connections that wait in the system's queue, as far as the system permits: room for a
-/// whole fleet that comes back at once.
+/// Length of the system's queue of connections, if the system permits: room for a whole fleet
+/// that reconnects at once.
 const LISTEN_BACKLOG: u32 = 4096;
-/// Pause after the system cannot accept a connection, for lack of descriptors, say.
+/// Pause after the system could not accept a connection, for example for lack of file
+/// descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
 /// Time for a TLS handshake.
 pub const TLS_HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// How many connections a server has, and for how long.
+/// Limits of a server's connections.
 #[derive(Debug, Clone, Copy)]
 pub struct ListenerLimits {
-    /// For those who have made no permitted request yet. They have places of their own, so
-    /// that they cannot keep out the others.
+    /// Places of strangers, connections without a permitted request so far. Strangers have their
+    /// own places, so that they cannot keep out the others.
     pub strangers: Room,
-    /// Time for a connection to make a request that is permitted. So those who know no
-    /// token cannot keep the others out by holding all connections.
+    /// Time for a connection to make a permitted request. So peers without a token cannot keep
+    /// others out by holding all connections.
     pub admission_time: Duration,
-    /// For those who have.
+    /// Places of connections with a permitted request.
     pub known: Known,
-    /// Time for a peer to read something of an answer that waits for it.
+    /// Time for a peer to read a part of a waiting answer.
     pub stall_time: Duration,
 }
 
-/// What becomes of one connection too many of those who have made a permitted request.
+/// The handling of one connection too many with a permitted request.
 #[derive(Debug, Clone, Copy)]
 pub enum Known {
     /// Its request is refused.
     Refused {
-        /// Connections at the same time.
+        /// Number of simultaneous connections.
         n_places: usize,
     },
     /// It ends another.
     EndsAnother(Room),
 }
 
-/// Listens; a connection for which the system's queue has no room is tried again by the
-/// peer's system after a second.
+/// Listens on an address. If the system's queue is full, the peer's system tries again after a
+/// second.
 pub fn bind(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
-    // As std does: a server that is started again gets its port back.
+    // As std does: a restarted server gets its port back.
     socket.set_reuseaddr(true)?;
     socket.bind(address)?;
     socket.listen(LISTEN_BACKLOG)
@@ -105,8 +106,8 @@ async fn accept_all(
                 continue;
             }
         };
-        // Batches and heartbeats are small and urgent. If the option cannot be set
-        // the connection is broken, as will be seen.
+        // Batches and heartbeats are small and urgent. If the option cannot be set, the
+        // connection is broken, and the next operation fails.
         let _ = io.set_nodelay(true);
         let (connection, has_ended_another) = Connection::new(io, address, places);
         if has_ended_another && let Some(withheld) = log.on_line(Instant::now().into_std()) {

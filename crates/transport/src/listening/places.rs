@@ -1,4 +1,4 @@
-//! The places of connections: who has one, and who has to give it up.
+//! The places of connections, and the rules for giving them up.
 
 use std::{
     net::SocketAddr,
@@ -17,7 +17,7 @@ use super::{
     crowd::{Crowd, MemberId},
 };
 
-/// Between two looks whether there is a place.
+/// Interval between attempts to get a place.
 const ADMISSION_PAUSE: Duration = Duration::from_millis(20);
 
 type SharedCrowd = Arc<Mutex<Crowd>>;
@@ -39,18 +39,18 @@ enum KnownPlaces {
     EndsAnother(SharedCrowd),
 }
 
-/// Whose a connection is.
+/// The standing of a connection's peer.
 #[derive(Debug)]
 enum Standing {
-    /// Of somebody who has made no request yet that was permitted.
+    /// The peer has made no permitted request yet.
     Stranger(MemberId),
-    /// Of somebody known, for as long as it lasts.
+    /// The peer is known, and keeps its place as long as the connection lasts.
     Known { _place: OwnedSemaphorePermit },
-    /// Of somebody known, until it has to make room.
+    /// The peer is known, and keeps its place until it has to make room.
     Guest(SharedCrowd, MemberId),
 }
 
-/// Who is at the other end of a connection.
+/// The peer at the other end of a connection.
 #[derive(Debug, Clone)]
 pub struct Peer {
     address: SocketAddr,
@@ -65,7 +65,7 @@ struct Place {
     has_to_go: CancellationToken,
 }
 
-/// There are as many connections of others.
+/// All places are taken by other connections.
 #[derive(Debug)]
 pub struct TooManyConnections;
 
@@ -85,7 +85,7 @@ impl Places {
         }
     }
 
-    /// Waits until another stranger may come.
+    /// Waits for a place for another stranger.
     pub async fn wait_for_one(&self) {
         loop {
             let left = self.left.notified();
@@ -100,7 +100,7 @@ impl Places {
         }
     }
 
-    /// A stranger comes. Returns, too, whether another had to make room.
+    /// Gives a place to a stranger. Also returns whether another one had to make room.
     pub fn enter(&self, address: SocketAddr) -> (Peer, bool) {
         let has_to_go = CancellationToken::new();
         let (id, has_ended_another) =
@@ -150,13 +150,16 @@ impl Drop for Place {
 }
 
 impl Peer {
-    /// Where it connected from.
+    /// The address from which it connected.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// It has made a request that is permitted: it is known from now on, and its connection
-    /// may stay, if there is a place.
+    /// Admits the peer after a permitted request: its connection may stay if there is a place.
+    ///
+    /// # Errors
+    ///
+    /// If all places are taken.
     pub fn admit(&self) -> Result<(), TooManyConnections> {
         let Place { places, has_to_go, .. } = &*self.connection;
         let mut standing = lock(&self.connection.standing);
@@ -172,22 +175,22 @@ impl Peer {
         Ok(())
     }
 
-    /// As [`Self::admit`], and waits for a place if there is none.
+    /// As [`Self::admit`], but waits for a place.
     pub async fn admitted(&self) {
         while self.admit().is_err() {
             sleep(ADMISSION_PAUSE).await;
         }
     }
 
-    /// It has said something.
+    /// The peer has sent something.
     pub(super) fn on_heard(&self) {
         if let Standing::Stranger(id) = *lock(&self.connection.standing) {
             lock(&self.connection.places.strangers).on_heard(id);
         }
     }
 
-    /// Ends when the connection has to: it is late with its first permitted request, or
-    /// makes room.
+    /// Completes when the connection has to end, because its first permitted request is late, or
+    /// to make room.
     pub(super) async fn has_to_go(self) {
         let Place { places, has_to_go, standing } = &*self.connection;
         tokio::select! {

@@ -1,4 +1,4 @@
-//! Strangers and slow peers, on connections in memory and on real sockets.
+//! Strangers and slow peers, with connections in memory and with real sockets.
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -68,7 +68,7 @@ async fn a_peer_that_reads_nothing_for_too_long_loses_its_connection() {
     let (mut connection, mut far) = connection(&places(1));
     connection.connect_info().admit().unwrap();
     let start = Instant::now();
-    // One that reads slowly keeps it.
+    // A slow reader keeps its connection.
     let reading = tokio::spawn(async move {
         for _ in 0..5 {
             sleep(Duration::from_secs(20)).await;
@@ -129,14 +129,14 @@ async fn a_flood_waits_until_the_strangers_had_time_to_introduce_themselves() {
     let start = Instant::now();
     places.wait_for_one().await;
     assert!(start.elapsed() >= ROOM.silent_grace);
-    // Unless one leaves, or is let in.
+    // Unless a stranger leaves or is admitted.
     strangers.extend([connection(&places)]);
     strangers.truncate(ROOM.n_places);
     strangers[1].0.connect_info().admit().unwrap();
     places.wait_for_one().await;
 }
 
-/// A server that answers `/` with a word and everything else never.
+/// A server that answers `/` with a word, and never answers other requests.
 async fn server(tls: Option<Arc<rustls::ServerConfig>>) -> SocketAddr {
     let listener = bind("127.0.0.1:0".parse().unwrap()).unwrap();
     let address = listener.local_addr().unwrap();
@@ -163,7 +163,7 @@ async fn flood(address: SocketAddr, bytes: &[u8]) -> Vec<TcpStream> {
     let mut streams = Vec::new();
     for _ in 0..4 * ROOM.n_places {
         let mut stream = TcpStream::connect(address).await.unwrap();
-        // It may have had to go already.
+        // The server may have ended it already.
         let _ = stream.write_all(bytes).await;
         streams.push(stream);
     }
