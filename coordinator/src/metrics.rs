@@ -1,4 +1,5 @@
-//! The coordinator's metrics, and their values at a scrape. `docs/metrics.md` has the same list.
+//! The coordinator's metrics, and their values at a scrape. A test writes
+//! the list in `docs/metrics.md`.
 
 use swarm_telemetry::{Histogram, Metric, Scrape, metrics};
 use tokio::sync::oneshot;

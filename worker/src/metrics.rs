@@ -1,4 +1,5 @@
-//! The worker's metrics, and their values at a scrape. `docs/metrics.md` has the same list.
+//! The worker's metrics, and their values at a scrape. A test writes
+//! the list in `docs/metrics.md`.
 
 use sim_core::Isa;
 use swarm_telemetry::{Metric, Scrape, metrics};
