@@ -70,7 +70,7 @@ impl Senses {
             if let Some(source) = source {
                 noise[source].n_sensors += 1;
             }
-            let reading_len = mounted.sensor.reading_len();
+            let reading_len = mounted.reading_len;
             let is_wanted = |robot| !perturbations.inhibits(robot, mounted.query);
             sensors.push(SensorState {
                 query: mounted.query,

@@ -257,7 +257,7 @@ impl World {
             controller: config.controller,
             stimuli,
             readings: readings(&config.sensors),
-            sensors: sensors::mount(&config.sensors, &self.lights, &self.areas),
+            sensors: sensors::mount(&config.sensors, self),
             drive: config.actuators.wheel_actuator.as_ref().map(|wheels| Drive {
                 max_speed: wheels.max_speed,
                 axle_length: wheels.axle_length,

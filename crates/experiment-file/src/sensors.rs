@@ -1,6 +1,7 @@
 //! The sensors of robots: one row per kind of sensor in [`sensors!`] below, from which the key in
 //! files, the readings that stimuli may name, their checks and the budget follow; then the
-//! parameters of each kind, in `parameters!`. `sim-core`'s `sensors` compute the readings.
+//! parameters of each kind, in `parameters!`. For each row but the radio's, `sim-core` has a function
+//! of that name, which makes the sensor that computes the reading.
 
 use std::f64::consts::PI;
 
@@ -29,9 +30,9 @@ pub(crate) const UNSUPPORTED_READINGS: &[&str] = &[
 /// From a row per kind of sensor: its key in `sensors` and the type of its
 /// parameters; the sectors in which every other robot and every light may be, which are
 /// what a robot's sensor costs per step, for the budget of an episode; then its readings,
-/// each with its name in the file and its length.
+/// each with its name in the file and its length. `$dollar` is `$`, for the macro that it makes.
 macro_rules! sensors {
-    ($(
+    ($dollar:tt $(
         $(#[doc = $sensor_doc:literal])*
         $key:ident: $config:ident, seen: $n_sectors:expr, {
             $(
@@ -86,6 +87,15 @@ macro_rules! sensors {
             }
         }
 
+        /// Calls a macro with every sensor: its key, and its readings as variants of
+        /// [`SensorQuery`].
+        #[macro_export]
+        macro_rules! for_each_sensor {
+            ($dollar each:ident) => {
+                $($dollar each!($key: $($query)*);)*
+            };
+        }
+
         impl SensorQuery {
             /// All of them.
             pub const ALL: &[Self] = &[$($(Self::$query,)*)*];
@@ -107,7 +117,7 @@ macro_rules! sensors {
     };
 }
 
-sensors! {
+sensors! { $
     /// Frames of other robots.
     wireless_receiver: WirelessReceiverConfig, seen: |sensor| sensor.n_sectors, {
         /// Message of the chosen frame; `msg_length` values.

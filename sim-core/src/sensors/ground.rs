@@ -1,7 +1,21 @@
-//! Ground sensor: whether the robot stands on an area of its colour.
+//! The ground: whether the robot stands on an area of some colour.
 
-use super::{Noise, Sensor, Surroundings, Viewpoint};
+use super::{Sensor, Surroundings, Viewpoint};
 use crate::objects::StaticObjects;
+use crate::world::World;
+use experiment_file::{GroundSensorConfig, PlainSensorConfig};
+
+pub(super) fn ground_sensor(config: &GroundSensorConfig, world: &World) -> GroundSensor {
+    GroundSensor::new(&config.color, world)
+}
+
+pub(super) fn food_area_sensor(_: &PlainSensorConfig, world: &World) -> GroundSensor {
+    GroundSensor::new("green", world)
+}
+
+pub(super) fn nest_sensor(_: &PlainSensorConfig, world: &World) -> GroundSensor {
+    GroundSensor::new("black", world)
+}
 
 /// A ground sensor and the areas that it can see. Its reading is 1 on an area,
 /// else 0.
@@ -12,21 +26,13 @@ pub(crate) struct GroundSensor {
 }
 
 impl GroundSensor {
-    /// For those of `areas` that have its colour.
-    pub fn new(color: &str, areas: &[StaticObjects]) -> Self {
-        Self { areas: StaticObjects::of_color(areas, color).collect() }
+    /// For those of the world's areas that have its colour.
+    fn new(color: &str, world: &World) -> Self {
+        Self { areas: StaticObjects::of_color(&world.areas, color).collect() }
     }
 }
 
 impl Sensor for GroundSensor {
-    fn reading_len(&self) -> usize {
-        1
-    }
-
-    fn noise(&self) -> Noise {
-        Noise::NONE
-    }
-
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
         let Surroundings { torus, areas, switches, .. } = surroundings;
         let stands_on = |&(area, radius): &(usize, f64)| {

@@ -3,13 +3,13 @@
 use super::{Decay, Noise, NoiseStream, Sensor, Surroundings, Viewpoint, take_sectors};
 use crate::objects::StaticObjects;
 use crate::torus::wrap_angle;
+use crate::world::World;
 use experiment_file::LightSensorConfig;
 
 /// A light sensor and the lights that it can see. Readings per sector, in
 /// \[0, 1\].
 #[derive(Debug, Clone)]
 pub(crate) struct LightSensor {
-    n_sectors: usize,
     decay: Decay,
     /// Largest angle off a sector's direction at which it sees, radians.
     aperture: f64,
@@ -18,25 +18,18 @@ pub(crate) struct LightSensor {
     lights: Vec<(usize, f64)>,
 }
 
-impl LightSensor {
-    /// As configured, for those of `lights` that have its colour.
-    pub fn new(config: &LightSensorConfig, lights: &[StaticObjects]) -> Self {
-        let lights = StaticObjects::of_color(lights, &config.color);
-        Self {
-            n_sectors: config.n_sectors as usize,
-            decay: Decay { rho: config.decay_rho, phi: config.decay_phi },
-            aperture: config.aperture,
-            noise_deviation: config.noise_variance.sqrt(),
-            lights: lights.map(|(light, range)| (light, range.min(config.range))).collect(),
-        }
+/// For those of the world's lights that have its colour.
+pub(super) fn light_sensor(config: &LightSensorConfig, world: &World) -> LightSensor {
+    let lights = StaticObjects::of_color(&world.lights, &config.color);
+    LightSensor {
+        decay: Decay { rho: config.decay_rho, phi: config.decay_phi },
+        aperture: config.aperture,
+        noise_deviation: config.noise_variance.sqrt(),
+        lights: lights.map(|(light, range)| (light, range.min(config.range))).collect(),
     }
 }
 
 impl Sensor for LightSensor {
-    fn reading_len(&self) -> usize {
-        self.n_sectors
-    }
-
     fn noise(&self) -> Noise {
         Noise { deviation: self.noise_deviation, stream: NoiseStream::LIGHT_AND_DISTANCE }
     }
@@ -75,7 +68,6 @@ mod tests {
 
     fn sense_within(aperture: f64, lights: &[Vec2], reach: f64, heading: f64) -> Vec<f64> {
         let sensor = LightSensor {
-            n_sectors: 4,
             decay: Decay { rho: 0.05, phi: 1.0 },
             aperture,
             noise_deviation: 0.0,

@@ -1,45 +1,38 @@
 //! Sensors beside the wireless receiver (section 3.2.2 of the thesis). Sector j of
 //! n points to heading + j * 2 pi / n.
 //!
-//! A kind of sensor implements [`Sensor`] in a file of its own and is mounted by
-//! [`mount`].
+//! A kind of sensor implements [`Sensor`] in the file of what it measures. A function with the
+//! name of its key in files makes it, and [`mount`] calls that function.
 
-mod distance;
 mod ground;
 mod light;
-mod neighborhood;
 mod own;
+mod robots;
 mod scripted;
 
 use std::fmt::Debug;
 use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 
-use distance::DistanceSensor;
-use ground::GroundSensor;
-use light::LightSensor;
-use neighborhood::NeighborhoodSensor;
-use own::{FoodSensor, OwnOrientationSensor, OwnPositionSensor};
-use scripted::ScriptSensor;
-
+use self::{ground::*, light::*, own::*, robots::*, scripted::*};
 use crate::neighbours::Neighbours;
-use crate::objects::{StaticObjects, Switches};
+use crate::objects::Switches;
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2, angular_difference, sector_angle};
-use experiment_file::{SensorQuery, SensorsConfig};
+use crate::world::World;
+use experiment_file::{SensorQuery, SensorsConfig, for_each_sensor};
 
 /// A kind of sensor with its parameters, as mounted on the robots of a group.
 pub(crate) trait Sensor: Debug + Send + Sync {
-    /// Number of values of a reading.
-    fn reading_len(&self) -> usize;
-
     /// Range to which the values of a reading are clipped, after noise.
     fn value_range(&self) -> RangeInclusive<f64> {
         0.0..=1.0
     }
 
     /// Noise of each value.
-    fn noise(&self) -> Noise;
+    fn noise(&self) -> Noise {
+        Noise::NONE
+    }
 
     /// Distance beyond which it senses no other robot, cm; 0: it senses none.
     fn robots_within(&self) -> f64 {
@@ -60,7 +53,7 @@ pub(crate) trait Sensor: Debug + Send + Sync {
         surroundings: &Surroundings<'_>,
         readings: &mut [f64],
     ) {
-        let readings = readings.chunks_exact_mut(self.reading_len());
+        let readings = readings.chunks_exact_mut(readings.len() / robots.len());
         for ((robot, reading), _) in
             robots.zip(readings).zip(is_wanted).filter(|(_, is_wanted)| **is_wanted)
         {
@@ -110,63 +103,30 @@ impl NoiseStream {
 pub(crate) struct MountedSensor {
     /// The name that stimuli have for the reading.
     pub query: SensorQuery,
+    /// Number of values of the reading.
+    pub reading_len: usize,
     /// The sensor.
     pub sensor: Arc<dyn Sensor>,
 }
 
-/// The sensors of a group of robots. Those that share a stream of noise draw from
-/// it in this order.
-pub(crate) fn mount(
-    config: &SensorsConfig,
-    lights: &[StaticObjects],
-    areas: &[StaticObjects],
-) -> Vec<MountedSensor> {
-    // What frames a receiver takes is the radio's business.
-    let SensorsConfig {
-        wireless_receiver: _,
-        light_sensor,
-        distance_sensor,
-        ground_sensor,
-        food_area_sensor,
-        nest_sensor,
-        food_sensor,
-        own_position_sensor,
-        own_orientation_sensor,
-        neighborhood_pos_sensor,
-        script_sensor,
-    } = config;
+/// The sensors of a group of robots, in the order of the rows in `sensors!`, in which those that
+/// share a stream of noise draw from it.
+pub(crate) fn mount(config: &SensorsConfig, world: &World) -> Vec<MountedSensor> {
     let mut mounted = Vec::new();
-    let mut mount = |query, sensor: Arc<dyn Sensor>| mounted.push(MountedSensor { query, sensor });
-    if let Some(config) = light_sensor {
-        mount(SensorQuery::Light, Arc::new(LightSensor::new(config, lights)));
+    let mut add = |query, sensor: Arc<dyn Sensor>| {
+        let reading_len = config.reading_len(query).unwrap_or(0) as usize;
+        mounted.push(MountedSensor { query, reading_len, sensor });
+    };
+    macro_rules! mount {
+        // What frames a receiver takes is the radio's business.
+        (wireless_receiver: $($query:ident)*) => {};
+        ($key:ident: $query:ident) => {
+            if let Some(sensor) = &config.$key {
+                add(SensorQuery::$query, Arc::new($key(sensor, world)));
+            }
+        };
     }
-    if let Some(config) = distance_sensor {
-        mount(SensorQuery::Distance, Arc::new(DistanceSensor::new(config)));
-    }
-    if let Some(config) = ground_sensor {
-        mount(SensorQuery::Ground, Arc::new(GroundSensor::new(&config.color, areas)));
-    }
-    if food_area_sensor.is_some() {
-        mount(SensorQuery::FoodArea, Arc::new(GroundSensor::new("green", areas)));
-    }
-    if nest_sensor.is_some() {
-        mount(SensorQuery::Nest, Arc::new(GroundSensor::new("black", areas)));
-    }
-    if food_sensor.is_some() {
-        mount(SensorQuery::Food, Arc::new(FoodSensor));
-    }
-    if own_position_sensor.is_some() {
-        mount(SensorQuery::OwnPosition, Arc::new(OwnPositionSensor));
-    }
-    if own_orientation_sensor.is_some() {
-        mount(SensorQuery::OwnOrientation, Arc::new(OwnOrientationSensor));
-    }
-    if let Some(config) = neighborhood_pos_sensor {
-        mount(SensorQuery::NeighborhoodPos, Arc::new(NeighborhoodSensor::new(config)));
-    }
-    if let Some(config) = script_sensor {
-        mount(SensorQuery::Script, Arc::new(ScriptSensor::new(config)));
-    }
+    for_each_sensor!(mount);
     mounted
 }
 

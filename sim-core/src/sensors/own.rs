@@ -3,23 +3,29 @@
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
-use super::{Noise, Sensor, Surroundings, Viewpoint};
+use super::{Sensor, Surroundings, Viewpoint};
+use crate::world::World;
+use experiment_file::PlainSensorConfig;
+
+pub(super) fn own_position_sensor(_: &PlainSensorConfig, _: &World) -> OwnPositionSensor {
+    OwnPositionSensor
+}
+
+pub(super) fn own_orientation_sensor(_: &PlainSensorConfig, _: &World) -> OwnOrientationSensor {
+    OwnOrientationSensor
+}
+
+pub(super) fn food_sensor(_: &PlainSensorConfig, _: &World) -> FoodSensor {
+    FoodSensor
+}
 
 /// Position: x and y, cm.
 #[derive(Debug, Clone)]
 pub(crate) struct OwnPositionSensor;
 
 impl Sensor for OwnPositionSensor {
-    fn reading_len(&self) -> usize {
-        2
-    }
-
     fn value_range(&self) -> RangeInclusive<f64> {
         0.0..=f64::MAX
-    }
-
-    fn noise(&self) -> Noise {
-        Noise::NONE
     }
 
     fn sense(&self, from: Viewpoint, _: &Surroundings<'_>, reading: &mut [f64]) {
@@ -32,14 +38,6 @@ impl Sensor for OwnPositionSensor {
 pub(crate) struct OwnOrientationSensor;
 
 impl Sensor for OwnOrientationSensor {
-    fn reading_len(&self) -> usize {
-        1
-    }
-
-    fn noise(&self) -> Noise {
-        Noise::NONE
-    }
-
     fn sense(&self, from: Viewpoint, _: &Surroundings<'_>, reading: &mut [f64]) {
         reading[0] = from.heading / TAU;
     }
@@ -50,14 +48,6 @@ impl Sensor for OwnOrientationSensor {
 pub(crate) struct FoodSensor;
 
 impl Sensor for FoodSensor {
-    fn reading_len(&self) -> usize {
-        1
-    }
-
-    fn noise(&self) -> Noise {
-        Noise::NONE
-    }
-
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
         reading[0] = f64::from(surroundings.swarm.carries[from.robot]);
     }
@@ -82,15 +72,15 @@ mod tests {
         let swarm = &swarm;
         let surroundings =
             Surroundings { torus, swarm, neighbours, lights: &[], areas: &[], switches };
-        let read = |sensor: &dyn Sensor, robot: usize| {
+        let read = |sensor: &dyn Sensor, robot: usize, reading_len: usize| {
             let (position, heading) = (swarm.positions[robot], swarm.headings[robot]);
-            let mut reading = vec![7.0; sensor.reading_len()];
+            let mut reading = vec![7.0; reading_len];
             sensor.sense(Viewpoint { robot, position, heading }, &surroundings, &mut reading);
             assert!(reading.iter().all(|value| sensor.value_range().contains(value)));
             reading
         };
-        assert_eq!(read(&OwnPositionSensor, 1), [730.0, 20.0]);
-        assert_eq!(read(&OwnOrientationSensor, 1), [0.75]);
-        assert_eq!((read(&FoodSensor, 0), read(&FoodSensor, 1)), (vec![0.0], vec![1.0]));
+        assert_eq!(read(&OwnPositionSensor, 1, 2), [730.0, 20.0]);
+        assert_eq!(read(&OwnOrientationSensor, 1, 1), [0.75]);
+        assert_eq!((read(&FoodSensor, 0, 1), read(&FoodSensor, 1, 1)), (vec![0.0], vec![1.0]));
     }
 }

@@ -2,37 +2,18 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Noise, Sensor, Surroundings, Viewpoint};
+use super::{Sensor, Surroundings, Viewpoint};
+use crate::world::World;
 use experiment_file::ScriptSensorConfig;
 
-/// A sensor whose readings the script fills in, after all other sensors have sensed.
-#[derive(Debug, Clone)]
-pub(crate) struct ScriptSensor {
-    n_values: usize,
-    low: f64,
-    high: f64,
+pub(super) fn script_sensor(config: &ScriptSensorConfig, _: &World) -> ScriptSensorConfig {
+    config.clone()
 }
 
-impl ScriptSensor {
-    /// As configured.
-    pub fn new(config: &ScriptSensorConfig) -> Self {
-        let &ScriptSensorConfig { n, low, high } = config;
-        Self { n_values: n as usize, low, high }
-    }
-}
-
-impl Sensor for ScriptSensor {
-    fn reading_len(&self) -> usize {
-        self.n_values
-    }
-
+/// The script fills in the readings, after all other sensors have sensed, and draws its noise.
+impl Sensor for ScriptSensorConfig {
     fn value_range(&self) -> RangeInclusive<f64> {
         self.low..=self.high
-    }
-
-    /// The script draws its own.
-    fn noise(&self) -> Noise {
-        Noise::NONE
     }
 
     /// The reading of the step before stays until the script has said the new one.
