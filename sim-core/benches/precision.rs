@@ -1,9 +1,9 @@
-//! What f32 networks cost in fidelity: the fitness of 200 genotypes per experiment,
-//! by the simulator and by the reference, which computes in f64 throughout.
+//! Measures the effect of f32 networks on fitness: 200 genotypes per experiment, with the
+//! simulator and with the reference, which computes in f64 throughout.
 //!
-//! A trajectory follows its reference until a number falls on the other side of a
-//! threshold or of a draw; from there on it is another sample of the same process.
-//! So single values may differ, and their distribution must not.
+//! A trajectory follows its reference until a number falls on the other side of a threshold or a
+//! draw; from then on, it is another sample of the same process. So single values may differ, but
+//! their distribution must not.
 
 #[allow(dead_code, unused_imports, reason = "the tests need more of it")]
 #[path = "../tests/configs/mod.rs"]

@@ -1,6 +1,5 @@
-//! How fast the simulation is, beside a naive scalar f64 transcription of the same
-//! equations (the one that the tests compare it with) and beside the most that the
-//! processor's multiply-adds allow.
+//! Measures the speed of the simulation, against a naive scalar f64 transcription of the same
+//! equations (the reference of the tests), and against the processor's peak of multiply-adds.
 //!
 //! The two sides of a ratio take turns, so that a machine that slows down slows
 //! both; figures are medians. `SWARM_ISA` chooses the vector instructions, and an
@@ -29,14 +28,13 @@ use sim_core::{Isa, Simulation};
 
 use configs::{experiment_a, experiment_b, experiment_c, experiment_d, swarm_mut};
 
-/// Rounds of which the median counts.
+/// Number of rounds, of which the median counts.
 const N_ROUNDS: usize = 9;
-/// Duration of one measurement, about.
+/// Approximate duration of one measurement.
 const MEASUREMENT: Duration = Duration::from_millis(100);
 /// Trials of a genotype, side by side as in the experiments.
 const N_TRIALS: u32 = 5;
-/// Robot-steps of a reference episode, about: enough for its setting up not to
-/// matter.
+/// Approximate robot-steps of a reference episode, enough to make its setup negligible.
 const REFERENCE_ROBOT_STEPS: u32 = 3_000;
 
 fn main() {
@@ -183,7 +181,7 @@ fn spiking_a(model: NeuronModel, synapses: SynapseModel) -> ExperimentConfig {
         topology.decoding[name] =
             DecodingConfig::LinearPopulationDecoding { num_outputs, rest_value: 0.5 };
     }
-    // Of dynamic synapses the reversal potential makes a current of some tens per weight.
+    // The reversal potential of dynamic synapses gives a current of some tens per unit of weight.
     let mut strength = 150.0;
     if synapses == SynapseModel::Dynamic {
         strength = 5.0;
@@ -251,8 +249,8 @@ fn sizes(isa: Isa) {
     }
 }
 
-/// What a trial costs in an item of fewer trials than five, whose lanes fill fewer
-/// vectors less well.
+/// The cost of a trial in an item with fewer than five trials, whose lanes fill vectors less
+/// well.
 fn items(isa: Isa) {
     println!("\nitems ({isa}): time per trial, relative to that in an item of {N_TRIALS}");
     println!("{:20} {:>10} {:>10} {:>10} {:>10}", "trials of the item", 1, 2, 3, 4);
@@ -303,7 +301,7 @@ fn scripts(isa: Isa) {
     }
 }
 
-/// `n` robots in a square that gives each the room that 10 have in experiment D.
+/// `n` robots in a square with the density of experiment D's 10 robots.
 fn resize(config: &mut ExperimentConfig, n: u32) {
     let scale = f64::from(n).sqrt() / 10_f64.sqrt();
     let center = 500.0 * scale.max(1.0);
@@ -366,7 +364,7 @@ impl Evaluations {
     }
 }
 
-/// The naive network of one robot in the naive world, whose own cost hardly counts.
+/// The naive network of one robot in the naive world, whose own cost is negligible.
 fn reference_step(config: &ExperimentConfig, genotype: &[f64]) -> f64 {
     let mut short = config.clone();
     short.algorithm.evaluation_steps = REFERENCE_ROBOT_STEPS / n_robots(config);

@@ -1,14 +1,14 @@
-//! Is a champion worth what a run says? Makes many small runs and compares what each says
-//! with 10,000 fresh trials of its champion:
+//! Tests whether the reported fitness of champions is honest: makes many small runs, and compares
+//! each report with 10,000 fresh trials of its champion:
 //!
 //! ```sh
 //! cargo run --release -p sim-core --example champion_figure           # 200 runs of each task
 //! ```
 //!
-//! The tasks are the quickstart, cut down, and a fitness that is easy to compute, bounded
-//! and skewed, with a rare tail near 0. Of each it prints the mean error of the judgement
-//! and of the mean that selected the champion, with their standard errors, and how often the
-//! 95 % interval has the value on fresh trials. docs/notebook/2026-11-algorithms.md has the results.
+//! The tasks are a reduced quickstart, and a cheap fitness that is bounded and skewed, with a
+//! rare tail near 0. For each, it prints the mean error of the judgement and of the mean that
+//! selected the champion, with their standard errors, and how often the 95 % interval contains
+//! the value on fresh trials. docs/notebook/2026-11-algorithms.md has the results.
 
 use std::{
     env,
@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Fitness in \[0, 1\]: about as large as the genotype is good, and near 0 in one trial of 25.
+/// Fitness in \[0, 1\]: close to the quality of the genotype, and near 0 in one trial of 25.
 fn synthetic(seed: u64, genotype: &[f64], trial_set: TrialSet, trial: u32) -> f64 {
     let mut stream = Stream::new(seed, trial_set, trial.into(), Purpose::Reception, 0);
     let distance: f64 = genotype.iter().map(|gene| (gene - 0.3) * (gene - 0.3)).sum();
@@ -69,7 +69,7 @@ fn synthetic(seed: u64, genotype: &[f64], trial_set: TrialSet, trial: u32) -> f6
     if fails { 0.05 * luck } else { (1.0 - distance).max(0.0) * (1.0 - 0.3 * luck * luck * luck) }
 }
 
-/// What is known of the champion of a run.
+/// The estimates of a run's champion.
 #[derive(Debug, Clone, Copy, Default)]
 struct Figures {
     judged: f64,
@@ -81,8 +81,8 @@ struct Figures {
     n_selection_trials: u64,
 }
 
-/// A run from its first generation to its judgement, as `coordinator/src/runs/round.rs` has
-/// it, and then its champion on fresh trials.
+/// A run from its first generation to its judgement, as in `coordinator/src/runs/round.rs`, and
+/// then its champion on fresh trials.
 fn run(
     mut evolution: Evolution,
     evaluate: impl Fn(&[f64], TrialSet, Range<u32>) -> Vec<f64>,
@@ -111,7 +111,7 @@ fn run(
     let fitness = evaluate_all(judgement.genotypes(), judgement.trial_set(), N_JUDGEMENT_TRIALS);
     let (champion, _) = judgement.decide(&fitness);
     let judged = champion.judged.expect("fitness is finite");
-    // Those of generations that the run does not have.
+    // The trials of generations beyond the run are fresh.
     let fresh: Vec<f64> = (N_GENERATIONS..N_GENERATIONS + N_FRESH_SETS)
         .flat_map(|generation| evaluate(&champion.genotype, generation.into(), 0..N_FRESH_TRIALS))
         .collect();
@@ -125,7 +125,7 @@ fn run(
     }
 }
 
-/// Makes runs with seeds 0, 1, ... on all cores, and prints what they come to.
+/// Makes runs with seeds 0, 1, ... on all cores, and prints their figures.
 fn report(task: &str, n_runs: u64, run: impl Fn(u64) -> Figures + Sync) {
     let next = AtomicU64::new(0);
     let worker = || {

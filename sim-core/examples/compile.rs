@@ -1,4 +1,4 @@
-//! Compiles an experiment file and says what evolution will work on.
+//! Compiles an experiment file, and prints the structure of its genotypes.
 //!
 //! ```sh
 //! cargo run -p sim-core --example compile -- configs/leader_selection_snes.json

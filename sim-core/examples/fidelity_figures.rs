@@ -6,10 +6,10 @@
 //! cargo run --release -p sim-core --example fidelity_figures -- evolve    # a quarter of an hour
 //! ```
 //!
-//! Each is the mean over 200 uniformly random genotypes, on the trials of generation 0, as
-//! evolution would meet them. With `evolve` it prints what SNES makes of the readings of Eq.
-//! 5.5 that no key of an experiment file selects. What it makes of others, `swarmctl run
-//! --set` and `swarmctl compare` tell.
+//! Each figure is the mean over 200 uniformly random genotypes, on the trials of generation 0.
+//! With `evolve`, it prints the results of SNES under the interpretations of Eq. 5.5 that no key
+//! of an experiment file selects. For the others, use `swarmctl run --set` and `swarmctl
+//! compare`.
 
 use std::{env, error::Error, f64::consts::PI, fs};
 
@@ -20,7 +20,8 @@ use sim_core::Simulation;
 
 const N_GENOTYPES: u64 = 200;
 
-/// What is subtracted from 1 in Eq. 5.5, of the number of robots and the mean absolute action.
+/// The term that Eq. 5.5 subtracts from 1, as a function of the number of robots and the mean
+/// absolute action.
 type Wheels = fn(f64, f64) -> f64;
 
 const READINGS: [(&str, Wheels); 3] = [
@@ -82,8 +83,8 @@ fn read(name: &str) -> Result<String, Box<dyn Error>> {
     Ok(fs::read_to_string(format!("{}/../configs/{name}.json", env!("CARGO_MANIFEST_DIR")))?)
 }
 
-/// A file with other text in place of one that it has once. The order of its keys, which is
-/// that of the genes, stays.
+/// Replaces a text that occurs once in a file. The order of the keys, which is that of the genes,
+/// stays.
 fn with(file: &str, from: &str, to: &str) -> Result<String, Box<dyn Error>> {
     match file.matches(from).count() {
         1 => Ok(file.replace(from, to)),
@@ -114,7 +115,7 @@ fn fitness(file: &str) -> Result<f64, Box<dyn Error>> {
     Ok(mean(&all))
 }
 
-/// Of each trial of a generation, the mean of (1 - misalignment / pi) (1 - wheels).
+/// The mean of (1 - misalignment / pi) (1 - wheels) in each trial of a generation.
 fn eq_5_5(
     config: &ExperimentConfig,
     simulation: &Simulation,

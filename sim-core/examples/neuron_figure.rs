@@ -1,12 +1,13 @@
-//! What a neuron of each spiking model does with a constant current: writes
-//! `docs/figures/neuron-MODEL.svg`, a voltage over time and spikes per second against current.
+//! Draws the response of each spiking neuron model to a constant current: writes
+//! `docs/figures/neuron-MODEL.svg`, with a voltage over time and the spikes per second against
+//! the current.
 //!
 //! ```sh
 //! cargo run --release -p sim-core --example neuron_figure
 //! ```
 //!
-//! The neuron has the parameters that files have by default, and a weight of 1: its stimulus
-//! is its current. Spikes per second are those of 2 s of 1 ms substeps, after half a second.
+//! The neuron has the default parameters of experiment files and a weight of 1, so its stimulus
+//! is its current. Spikes per second are counted over 2 s of 1 ms substeps, after half a second.
 
 use std::{error::Error, fmt::Write as _, fs};
 
@@ -24,7 +25,7 @@ const ON: std::ops::Range<usize> = 50..400;
 const N_POINTS: usize = 160;
 const COUNTED: std::ops::Range<usize> = 500..2_500;
 
-/// What is drawn of a model.
+/// The ranges of a model's figure.
 struct Subject {
     model: NeuronModel,
     /// Current of the voltage over time.
@@ -113,7 +114,7 @@ fn experiment(model: NeuronModel) -> Result<ExperimentConfig, Box<dyn Error>> {
     Ok(ExperimentConfig::from_json(&file.to_string(), "neurons", ALGORITHMS)?.0)
 }
 
-/// Per substep: the voltage after it, mV, and whether it has a spike.
+/// For each substep, the voltage after it, mV, and whether it has a spike.
 fn course(simulation: &Simulation, current: f64) -> Result<Vec<(f64, bool)>, Box<dyn Error>> {
     let mut neuron = NetworkLoad::new(simulation, &[1.0], 1)?;
     let step = |substep| {

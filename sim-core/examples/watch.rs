@@ -1,4 +1,4 @@
-//! Watches an episode of a champion: prints measures and robots as it goes on.
+//! Watches an episode of a champion, and prints measures and robots step by step.
 //!
 //! ```sh
 //! cargo run --release -p sim-core --example watch -- configs/leader_selection_snes.json \
@@ -10,7 +10,7 @@ use std::{env, error::Error, fs};
 use experiment_file::ExperimentConfig;
 use sim_core::{Simulation, TrialSet};
 
-/// Steps between the lines that are printed.
+/// Steps between printed lines.
 const EVERY: u32 = 20;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -1,7 +1,7 @@
 //! The simulator agrees with a naive second transcription of the equations.
 //!
-//! Every test also looks at what happened in its episodes: agreement says
-//! nothing about a radio on which no robot sends.
+//! Every test also checks the events of its episodes: agreement would prove nothing about a radio
+//! on which no robot sends.
 
 mod cases;
 mod configs;
@@ -17,14 +17,12 @@ use reference::Episode;
 
 /// Largest difference between two fitness values that count as equal.
 ///
-/// The simulator's networks and quantisers compute in f32, the reference in f64,
-/// so activities differ by some 1e-7. That moves what is continuous (headings,
-/// positions) a little, and it changes what is drawn (an LED, a symbol, a sector)
-/// or compared (a range) only if a number falls into a gap of that width; from
-/// then on trajectories part. Among the draws of an episode, the same ones in
-/// every run, that is unlikely, the more so the fewer they are: episodes of robots
-/// that move are kept short. Genotypes and positions are chosen to stay clear of
-/// ties; where a tie is the point, its angles are exact.
+/// The simulator's networks and quantisers compute in f32, the reference in f64, so activities
+/// differ by about 1e-7. Continuous values (headings, positions) then differ a little. A draw (of
+/// an LED, symbol or sector) or a comparison (with a range) differs only if a number falls into a
+/// gap of that width; from then on, trajectories differ. An episode makes the same draws in every
+/// run, and with few draws this is unlikely, so episodes of moving robots are short. Genotypes
+/// and positions avoid ties; tests of ties use exact angles.
 const TOLERANCE: f64 = 1e-5;
 
 /// Asserts that simulator and reference give the same fitness in these trials,
@@ -59,13 +57,12 @@ fn random_genotype(config: &ExperimentConfig, seed: u64) -> Vec<f64> {
     reference::genes(config).iter().map(|_| stream.uniform()).collect()
 }
 
-/// A genotype from U(0.35, 0.65): its neurons stay sensitive to all they get.
+/// A genotype from U(0.35, 0.65): its neurons stay sensitive to all inputs.
 fn gentle_genotype(config: &ExperimentConfig, seed: u64) -> Vec<f64> {
     random_genotype(config, seed).into_iter().map(|x| 0.35 + 0.3 * x).collect()
 }
 
-/// Agreement in two trials of random and of gentle genotypes, whose fitness must
-/// differ.
+/// Asserts agreement in two trials of random and of gentle genotypes, whose fitness must differ.
 fn assert_varied_agreement(config: &ExperimentConfig) -> Vec<Episode> {
     let genotypes = (0..2).flat_map(|seed| {
         [random_genotype(config, 2 * seed), gentle_genotype(config, 2 * seed + 1)]

@@ -1,7 +1,7 @@
-//! Scripts that are damaged in every way: each is refused, fails with its file and line, or
-//! computes finite numbers; it never panics, hangs or takes memory without bound.
+//! Randomly damaged scripts: each is refused, fails with its file and line, or computes finite
+//! numbers. None panics, hangs or takes unlimited memory.
 //!
-//! `SWARM_TEST_SCRIPTS` says how many.
+//! `SWARM_TEST_SCRIPTS` sets their number.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{
@@ -19,7 +19,7 @@ use experiment_file::{
 };
 use sim_core::{EvaluateError, Simulation};
 
-/// Valid scripts, and the experiment file beside each that has one.
+/// Valid scripts, each with its experiment.
 fn scripts() -> Vec<(String, ExperimentConfig)> {
     let tasks = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/tasks");
     let read = |path: &Path| fs::read_to_string(path).unwrap();
@@ -45,7 +45,7 @@ fn scripts() -> Vec<(String, ExperimentConfig)> {
         (script.text, config)
     };
     let mut scripts: Vec<_> = paths.iter().map(|path| experiment(path)).collect();
-    // Some do more than look.
+    // Some scripts also act.
     for file in ["light_orbit.star", "light_prey.star"] {
         let (text, mut config) = experiment(&tasks.join("thesis/goto_light.star"));
         let moves = read(&tasks.join("moves").join(file));
@@ -74,7 +74,7 @@ fn scripts() -> Vec<(String, ExperimentConfig)> {
     scripts
 }
 
-/// Robots that turn to what they heard, and break down by chance.
+/// Robots that turn towards received frames, and fail at random.
 const ACTS: &str = "
 def control(robot):
     light = robot.sense('light_sensor')
@@ -92,9 +92,9 @@ def react(world):
     world.lights[0].on = world.step % 2 == 0
 ";
 
-/// How many of the pieces are values, the first ones.
+/// Number of the first pieces, which are values.
 const N_VALUES: usize = 17;
-/// What a mutation puts in.
+/// The pieces that a mutation inserts.
 const PIECES: [&str; 36] = [
     "0",
     "-1",
@@ -144,7 +144,7 @@ fn mutated(text: &str, stream: &mut Stream) -> String {
             _ => pieces.push(c.to_string()),
         }
     }
-    // One word for another: what is still a script, mostly.
+    // One word for another, which mostly stays a valid script.
     let words: Vec<usize> =
         (0..pieces.len()).filter(|&at| pieces[at].starts_with(is_word)).collect();
     for _ in 0..=stream.below(2) {
@@ -168,10 +168,10 @@ fn mutated(text: &str, stream: &mut Stream) -> String {
     pieces.concat()
 }
 
-/// Longest that five steps may take, on a machine with much other work: all that a script may
-/// use in them takes about a second.
+/// Longest time of five steps on a busy machine; a script's whole budget for them takes about a
+/// second.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// Most memory that this process may ever have had, KiB: scripts may keep some hundred KiB.
+/// Largest allowed peak memory of this process, KiB; a script may keep some hundred KiB.
 const PEAK_KIB: u64 = 256 << 10;
 
 #[test]
@@ -187,7 +187,7 @@ fn damaged_scripts_are_refused_or_fail_with_their_place_or_compute_numbers() {
         }
     }
     trying.join().unwrap();
-    // Where the system says it.
+    // Only if the system tells it.
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     if let Some(peak) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
         let peak: u64 = peak.trim().trim_end_matches(" kB").parse().unwrap();
@@ -195,7 +195,7 @@ fn damaged_scripts_are_refused_or_fail_with_their_place_or_compute_numbers() {
     }
 }
 
-/// `on_start` is told each script.
+/// `on_start` is called with each script.
 fn try_damaged_scripts(on_start: impl Fn(String)) {
     let n = std::env::var("SWARM_TEST_SCRIPTS").map_or(300, |n| n.parse().unwrap());
     let scripts = scripts();
@@ -234,7 +234,7 @@ fn try_damaged_scripts(on_start: impl Fn(String)) {
             Err(error) => panic!("{error}\n{text}"),
         }
     }
-    // All three happen, or the mutations are not worth their name.
+    // All three outcomes happen, otherwise the mutations are too weak or too strong.
     assert!(
         n_refused > n / 10 && n_failed > n / 50 && n_computed > n / 50,
         "{n_refused} refused, {n_failed} failed, {n_computed} computed"

@@ -1,12 +1,12 @@
-//! Experiment B: alpha shapes, components, the border of the torus, positions
-//! that change under the network.
+//! Experiment B: alpha shapes, components, the border of the torus, positions that change while
+//! the networks keep their state.
 
 use experiment_file::{Initializer, TopologySwitchConfig};
 
 use crate::configs::{experiment_b, receiver_mut, swarm_mut, transmitter_mut};
 use crate::{assert_agreement, random_genotype, spread};
 
-/// Seeds of genotypes that light some LEDs, and not always the same.
+/// Seeds of genotypes whose LEDs vary over time.
 const LIVELY: [u64; 3] = [4, 14, 15];
 
 #[test]
@@ -33,7 +33,7 @@ fn borders_of_other_alpha_shapes_agree() {
         let episodes = assert_agreement(&config, &random_genotype(&config, LIVELY[0]), 0, 0..3);
         episodes.iter().map(|episode| episode.witness.n_interior).sum::<usize>()
     });
-    // The greater alpha, the more concave the shape, and the more robots are on its border.
+    // With a larger alpha, the shape is more concave, and more robots are on its border.
     assert!(n_interior[0] > n_interior[1] && n_interior[1] > n_interior[2], "{n_interior:?}");
 }
 
@@ -61,7 +61,7 @@ fn scattered_swarms_agree() {
     transmitter_mut(&mut config).range = 110.0;
     let swarm = swarm_mut(&mut config);
     swarm.num_instances = 24;
-    // y is wrapped: the world's upper part lies on its lower one.
+    // y is wrapped, so the upper part of the world lies on the lower one.
     swarm.initializers.positions = Initializer::RandomUniform { low: 0.0, high: 650.0, size: 2 };
     swarm.perturbations.topology_switch = Some(TopologySwitchConfig { every: 4 });
     let mut n_interior = 0;

@@ -1,4 +1,4 @@
-//! What a genotype means: queries, segments, connections, defaults.
+//! The meaning of genotypes: queries, segments, connections, defaults.
 
 use experiment_file::{
     EnsembleSelector, ExperimentConfig, FitnessFunction, GenotypeQuery, NamedMap,
@@ -27,7 +27,7 @@ fn neurons(parameter: &'static str, of: &str) -> GenotypeQuery {
     GenotypeQuery::Neurons(parameter, selector)
 }
 
-/// What an ensemble's `params` say.
+/// The `params` of an ensemble.
 fn params(tau: f64, gain: f64, bias: f64) -> NamedMap<f64> {
     [("tau", tau), ("gain", gain), ("bias", bias)].map(|(name, x)| (name.to_owned(), x)).into()
 }
@@ -51,7 +51,7 @@ fn connect_all(config: &mut ExperimentConfig) {
     }
 }
 
-/// The length of the genotype, on which both implementations agree.
+/// The length of the genotype; asserts that both implementations agree.
 fn genotype_len(config: &ExperimentConfig) -> usize {
     let len = reference::genes(config).len();
     let simulation = Simulation::compile(config).expect("the configuration is valid");

@@ -13,14 +13,14 @@ use crate::{assert_agreement, random_genotype, spread};
 /// turn their LEDs on and off.
 const LIVELY: [u64; 4] = [517, 175, 66, 1374];
 
-/// Experiment A, scored like B: every LED of every step counts.
+/// Experiment A, scored like B, so that every LED of every step counts.
 fn scored_by_every_led() -> ExperimentConfig {
     let mut config = experiment_a();
     config.algorithm.fitness_function = FitnessFunction::IdentifyBorderline;
     config
 }
 
-/// Agreement in one trial of every lively genotype.
+/// Asserts agreement in one trial of every lively genotype.
 fn assert_lively_agreement(config: &ExperimentConfig) -> Vec<Episode> {
     LIVELY
         .iter()
@@ -81,7 +81,7 @@ fn message_lengths_and_alphabets_agree() {
         config.algorithm.evaluation_steps = 60;
         set_msg_length(&mut config, msg_length);
         transmitter_mut(&mut config).n_symbols = n_symbols;
-        // Warm enough for symbols other than the nearest.
+        // A temperature at which symbols other than the nearest occur.
         transmitter_mut(&mut config).beta = 10.0;
         let episodes = assert_lively_agreement(&config);
         assert!(spread(episodes.iter().map(|episode| episode.fitness)) > 0.01);
@@ -105,7 +105,8 @@ fn messages_outside_the_lattice_agree() {
     let mut config = scored_by_every_led();
     config.algorithm.evaluation_steps = 100;
     config.topology.ensembles["OUT_COMM"].activation = Some(Activation::Tanh);
-    // So warm that a message left at -1 would choose other symbols than one at 0.
+    // A temperature at which a message left at -1 would choose other symbols than one clipped to
+    // 0.
     transmitter_mut(&mut config).beta = 5.0;
     let episodes = assert_lively_agreement(&config);
     assert!(spread(episodes.iter().map(|episode| episode.fitness)) > 0.01);
@@ -133,7 +134,7 @@ fn receivers_and_transmitters_of_every_kind_agree() {
         receiver.decay_phi = decay_phi;
         config.topology.decoding["outC"] = DecodingConfig::ThresholdDecoding { stochastic: true };
         for Episode { witness, .. } in assert_lively_agreement(&config) {
-            // 30 cm reach nobody; a frame has made one hop when it is emitted.
+            // 30 cm reach no robot; a frame has one hop when it is emitted.
             let is_silent = sent < 40.0 || max_hops == 1;
             assert_eq!(witness.n_receptions == 0, is_silent, "{witness:?}");
             assert_eq!(witness.n_choices == 0, is_silent || n_sectors == 1, "{witness:?}");
@@ -202,7 +203,7 @@ fn a_single_robot_leads_for_fifty_steps() {
     assert!((episodes[0].fitness - 122.5 / 300.0).abs() < 1e-12);
     assert_eq!(episodes[0].witness.n_faults, 1);
 
-    // If it never fails, it is worth 5 per step in the end.
+    // A leader that never fails finally gets 5 per step.
     swarm_mut(&mut config).perturbations.leader_failure = None;
     let episodes = assert_agreement(&config, &random_genotype(&config, 0), 0, 0..1);
     assert!((episodes[0].fitness - (122.5 + 250.0 * 5.0) / 300.0).abs() < 1e-12);

@@ -9,7 +9,7 @@ use super::spiking::{encode, spiking};
 use crate::configs::experiment_c;
 use crate::{assert_agreement, random_genotype, reference, spread};
 
-/// Orientation consensus with plastic synapses, some coefficients of which evolve.
+/// Orientation consensus with plastic synapses; some coefficients evolve.
 fn plastic(
     mut config: ExperimentConfig,
     synapses: &[&str],
@@ -34,8 +34,7 @@ fn plastic(
     config
 }
 
-/// Fitness of some genotypes, on which both implementations agree; and that of the same
-/// networks without learning.
+/// Fitness of some genotypes, with and without learning; asserts that both implementations agree.
 fn agreed(config: &ExperimentConfig) -> Vec<[f64; 2]> {
     let mut rigid = config.clone();
     rigid.topology.learning.as_mut().expect("it learns").learning_rate = 0.0;

@@ -1,4 +1,4 @@
-//! The episodes in which simulator and reference are compared, by subject.
+//! Episodes that compare simulator and reference, by subject.
 
 mod borderline;
 mod genotypes;

@@ -1,5 +1,5 @@
-//! Experiment C and everything on wheels: motion, headings, their fitness
-//! functions, robots that do not obey.
+//! Experiment C and everything about wheels: motion, headings, their fitness functions,
+//! uncontrollable robots.
 
 use std::f64::consts::PI;
 
@@ -39,7 +39,7 @@ fn orientation_fitness_agrees_for_every_size() {
 
         config.algorithm.fitness_function = FitnessFunction::Alignment;
         config.algorithm.evaluation_steps = 130;
-        // Headings near 0 from both sides, so that few steps are worth nothing.
+        // Headings near 0 from both sides, so that few steps have fitness 0.
         swarm_mut(&mut config).initializers.orientations =
             Initializer::RandomUniform { low: -0.5, high: 0.5, size: 1 };
         assert_varied_agreement(&config);
@@ -51,7 +51,7 @@ fn a_relaying_swarm_that_turns_agrees() {
     let mut config = experiment_c();
     config.algorithm.evaluation_steps = 100;
     config.topology.decoding["outC"] = DecodingConfig::ThresholdDecoding { stochastic: true };
-    // Shorter than the swarm, so that frames need their hops; six sectors.
+    // Reach shorter than the swarm, so that frames need several hops; six sectors.
     receiver_mut(&mut config).range = 80.0;
     receiver_mut(&mut config).n_sectors = 6;
     let emitter = assert_varied_agreement(&config);
@@ -64,9 +64,9 @@ fn a_relaying_swarm_that_turns_agrees() {
 
 #[test]
 fn motion_agrees_for_every_kind_of_drive() {
-    // On arcs; then straight ahead, around one wheel, or not at all. Both across
-    // the border. The genotypes of the first avoid wheels that are equal but for
-    // a rounding error: their arc is a small difference of large numbers.
+    // Motion on arcs; then straight ahead, around one wheel, or none. Both cross the border. The
+    // first genotypes avoid wheels that differ only by rounding, because their arc is a small
+    // difference of large numbers.
     let identity = DecodingConfig::IdentityDecoding {};
     let bits = DecodingConfig::ThresholdDecoding { stochastic: true };
     type Genotype = fn(&ExperimentConfig, u64) -> Vec<f64>;

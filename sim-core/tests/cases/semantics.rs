@@ -1,4 +1,5 @@
-//! Keys in whose defaults thesis and original differ: each alone, and all together.
+//! Keys whose defaults differ between thesis and original simulator: each alone, and all
+//! together.
 
 use experiment_file::{
     Activation, DecodingConfig, ExperimentConfig, InitialRates, LightController, ObjectConfig,
@@ -10,8 +11,8 @@ use crate::configs::{experiment_c, experiment_d, swarm_mut, transmitter_mut};
 
 type Change = fn(&mut ExperimentConfig);
 
-/// Makes the changes to an experiment and asserts that simulator and reference agree on
-/// it, and that its fitness is not what it was.
+/// Changes an experiment, and asserts that simulator and reference agree on it, and that its
+/// fitness has changed.
 fn assert_agreement_after(experiment: &ExperimentConfig, changes: &[Change]) {
     let before = assert_varied_agreement(experiment);
     let mut changed = experiment.clone();
@@ -21,7 +22,8 @@ fn assert_agreement_after(experiment: &ExperimentConfig, changes: &[Change]) {
     assert!(differ, "nothing changed");
 }
 
-/// Experiment C with robots that also relay, and are scored by every bit of a heading.
+/// Experiment C with robots that also relay, with a fitness that depends on every bit of a
+/// heading.
 fn turning_swarm() -> ExperimentConfig {
     let mut config = experiment_c();
     config.algorithm.evaluation_steps = 40;

@@ -1,4 +1,4 @@
-//! Lights, distances, ground areas, noise, and stimuli that are taken away.
+//! Lights, distances, ground areas, noise, and inhibited stimuli.
 
 use experiment_file::{
     DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
@@ -143,7 +143,7 @@ fn robots_that_know_where_they_and_the_nearest_are_agree() {
         config.topology.stimuli[stimulus] = StimulusConfig { n, sensor };
     }
     assert_ne!(fitness(&assert_varied_agreement(&config)), without);
-    // Of two robots, none has three others.
+    // With two robots, no robot has three others.
     swarm_mut(&mut config).num_instances = 2;
     assert_varied_agreement(&config);
 }

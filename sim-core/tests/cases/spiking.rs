@@ -10,7 +10,7 @@ use experiment_file::{
 use crate::configs::{experiment_a, experiment_c};
 use crate::{assert_agreement, random_genotype, spread};
 
-/// An experiment with neurons of a model; weights evolve, of synapses and of decoders.
+/// An experiment with neurons of a model; weights of synapses and decoders evolve.
 pub(super) fn spiking(mut config: ExperimentConfig, model: NeuronModel) -> ExperimentConfig {
     let topology = &mut config.topology;
     (topology.neuron_model, topology.dt) = (model, 1.0);
@@ -40,8 +40,8 @@ pub(super) fn spiking(mut config: ExperimentConfig, model: NeuronModel) -> Exper
     config
 }
 
-/// Episodes are short: where one of two numbers crosses a threshold a substep earlier, in
-/// f32 or in f64, trajectories part.
+/// Episodes are short, because trajectories part once a number crosses a threshold in different
+/// substeps in f32 and f64.
 #[test]
 fn swarms_of_every_model_agree() {
     for model in NeuronModel::ALL.into_iter().filter(|model| model.is_spiking()) {
@@ -113,8 +113,8 @@ fn sloped(slope: f64, n_neurons: u32, values: [f64; 2], inverted: bool) -> Slope
     SlopedField { slope, n_neurons, min_stim: -1.0, max_stim: 1.0, min_val, max_val, inverted }
 }
 
-/// The stimuli of experiment C, which has four of 2, 1, 2 and 2 values, each by an encoder of its
-/// own, and a last one as it is.
+/// Encodes the stimuli of experiment C, four with 2, 1, 2 and 2 values, each with an encoder of
+/// its own, except a last one.
 pub(super) fn encode(config: &mut ExperimentConfig) {
     let gaussian = GaussianField {
         sigma: 2.0,
@@ -172,7 +172,7 @@ fn swarms_with_encoders_agree() {
     }
 }
 
-/// Weights of receptive fields evolve; what of them does not is exp(-|i - c|).
+/// Some weights of receptive fields evolve; the others are exp(-|i - c|).
 #[test]
 fn swarms_with_linear_and_identity_fields_agree() {
     for selector in [StimulusSelector::All, StimulusSelector::Named("I3".into())] {

@@ -31,8 +31,8 @@ pub fn experiment_a() -> ExperimentConfig {
     }
 }
 
-/// Experiment B, borderline identification (section 5.2): as A, other fitness, 20
-/// robots that do not fail.
+/// Experiment B, borderline identification (section 5.2): as A with another fitness and 20 robots
+/// that do not fail.
 pub fn experiment_b() -> ExperimentConfig {
     let mut config = experiment_a();
     config.name = "B".into();
@@ -157,7 +157,7 @@ fn leader_robots() -> RobotConfig {
     }
 }
 
-/// The ensemble that stands beside message and mode.
+/// The motor ensemble beside message and mode.
 struct Motor {
     name: &'static str,
     n: u32,

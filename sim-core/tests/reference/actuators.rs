@@ -1,4 +1,4 @@
-//! From activities to actions (decoding), and from wheel actions to motion.
+//! Decodes activities to actions, and moves robots by their wheel actions.
 
 use determinism::random::Stream;
 use experiment_file::{ActuatorQuery, DecodingConfig, TopologyConfig, WheelActuatorConfig};
@@ -8,14 +8,14 @@ use super::network::neurons_of;
 use super::torus::{Torus, wrap_angle};
 use super::world::Robot;
 
-/// What a robot does in a step.
+/// The actions of a robot in a step.
 #[derive(Clone, Debug)]
 pub struct Actions {
     /// Right and left, in [-1, 1].
     pub wheels: [f64; 2],
     /// Colour; 0 is off.
     pub led: u32,
-    /// None if the network does not control the mode.
+    /// `None` if the network does not control the mode.
     pub send: Option<bool>,
     /// Before quantisation.
     pub message: Vec<f64>,

@@ -50,11 +50,11 @@ fn components(positions: &[Vector], torus: Torus, range: f64) -> Vec<Vec<(usize,
     components
 }
 
-/// For each point of the plane, whether it is on the outer ring of the alpha
-/// shape. The shape is made of the Delaunay triangles (no point inside the
-/// circumcircle) with a circumradius under `largest_radius`. Outside is what one
-/// can walk to from afar without entering the shape; whatever touches the outside
-/// is on the ring. So are all of fewer than 4 points, or of points on a line.
+/// For each point of the plane, whether it is on the outer ring of the alpha shape. The shape is
+/// made of the Delaunay triangles (no point inside the circumcircle) with a circumradius under
+/// `largest_radius`. The outside is the part of the plane that a walk from afar reaches without
+/// entering the shape; points that touch it are on the ring. Fewer than 4 points, or points on a
+/// line, are all on the ring.
 fn alpha_shape(points: &[Vector], largest_radius: f64) -> Vec<bool> {
     let n = points.len();
     let mut triangles = Vec::new();
@@ -86,7 +86,7 @@ fn alpha_shape(points: &[Vector], largest_radius: f64) -> Vec<bool> {
     while next < outside.len() {
         let edge = outside[next];
         next += 1;
-        // One can walk through a triangle that is not in the shape.
+        // A walk may cross a triangle that is not in the shape.
         for triangle in triangles.iter().filter(|t| !t.in_shape && t.edges.contains(&edge)) {
             for further in triangle.edges {
                 if !outside.contains(&further) {
@@ -103,8 +103,7 @@ struct Triangle {
     in_shape: bool,
 }
 
-/// Centre and radius of the circle through three points; none if they are on a
-/// line.
+/// Centre and radius of the circle through three points; `None` if they are on a line.
 fn circumcircle(a: Vector, b: Vector, c: Vector) -> Option<(Vector, f64)> {
     let [bx, by] = difference(b, a);
     let [cx, cy] = difference(c, a);
@@ -144,7 +143,7 @@ fn the_middle_of_a_pentagon_is_inside_also_across_the_border_of_the_torus() {
         let far = pentagon([centre[0] + 300.0, centre[1]], 60.0);
         let both = [close.clone(), far].concat();
         assert_eq!(border(&both).iter().filter(|&&is_border| !is_border).count(), 2);
-        // Three robots have no inside, nor have robots on a line.
+        // Three robots have no interior, and neither have robots on a line.
         assert_eq!(border(&close[..3]), [true; 3]);
     }
     let line: Vec<Vector> = (0..5).map(|i| [950.0 + 30.0 * f64::from(i), 10.0]).collect();

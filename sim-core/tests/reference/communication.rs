@@ -7,15 +7,15 @@ use experiment_file::{SendingDirection, WirelessTransmitterConfig};
 use super::torus::{Torus, Vector, angular_difference, sector_direction};
 use super::world::Robot;
 
-/// What a robot puts on the air.
+/// The frame that a robot emits.
 #[derive(Clone, Debug)]
 pub struct Frame {
     pub message: Vec<f64>,
-    /// None: a relaying robot had nothing to relay.
+    /// `None`: a relaying robot had nothing to relay.
     pub originator: Option<usize>,
     pub hops: u32,
-    /// Of the originator. Carried from the second hop on; before that the receiver
-    /// observes it.
+    /// Sending direction of the originator. The frame carries it from the second hop on; before
+    /// that, the receiver observes it.
     pub original_direction: Option<Vector>,
 }
 
@@ -43,7 +43,7 @@ impl Frame {
         Self { message, originator: Some(originator), hops: 1, original_direction: None }
     }
 
-    /// Relay mode: a copy of what was received in this step, one hop further.
+    /// Relay mode: a copy of the frame received in this step, with one more hop.
     pub fn relayed(received: Option<&Reception>, msg_length: usize) -> Self {
         match received {
             Some(reception) => Self {
@@ -112,8 +112,8 @@ pub fn draw(weights: &[f64], uniform: f64) -> usize {
     weights.len() - 1
 }
 
-/// Section 3.3.2: what robot `receiver` hears of the frames on the air, if
-/// anything. `uniform` chooses among the sectors with a valid frame.
+/// Section 3.3.2: the frame that robot `receiver` takes from the air, if any. `uniform` chooses
+/// among the sectors with a valid frame.
 pub fn receive(
     receiver: usize,
     robots: &[Robot<'_>],
@@ -173,8 +173,8 @@ pub fn receive(
     })
 }
 
-/// (cos, sin) of the emitter's sector with the least angular difference to the
-/// bearing of the receiver, in the emitter's own frame; the lower sector on ties.
+/// (cos, sin) of the emitter's sector whose direction is nearest to the bearing of the receiver,
+/// in the emitter's own frame of reference; the lower sector wins ties.
 fn observed_sending_direction(emitter: &Robot<'_>, receiver: Vector, torus: Torus) -> Vector {
     let n = emitter.n_receiver_sectors();
     let bearing = torus.bearing(emitter.position, receiver);

@@ -1,4 +1,4 @@
-//! The network of a robot, of one kind of neurons or the other.
+//! The network of a robot, with rate neurons or spiking neurons.
 
 use determinism::random::Stream;
 use experiment_file::ExperimentConfig;
@@ -23,7 +23,7 @@ impl Controller {
         }
     }
 
-    /// Other weights of its synapses.
+    /// Replaces the weights of its synapses.
     pub fn set_weights(&mut self, matrices: Matrices) {
         match self {
             Self::Rate(network) => network.set_weights(matrices),

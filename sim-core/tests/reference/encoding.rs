@@ -1,4 +1,4 @@
-//! Encoders of stimuli and their receptive fields, one node after the other.
+//! Encoders of stimuli and their receptive fields, computed node by node.
 
 use determinism::random::Stream;
 use experiment_file::{EncodingScheme, ReceptiveField, TopologyConfig};
@@ -8,24 +8,24 @@ use experiment_file::{EncodingScheme, ReceptiveField, TopologyConfig};
 pub struct Encoder {
     scheme: EncodingScheme,
     field: ReceptiveField,
-    /// Node by node, of linear fields.
+    /// Weights of a linear field, node by node.
     weights: Vec<f64>,
     /// The values that it encodes, among those of all stimuli.
     values: std::ops::Range<usize>,
-    /// Its nodes, among what synapses start from in all stimuli.
+    /// Its nodes, among the sources of all stimuli.
     sources: std::ops::Range<usize>,
 }
 
-/// What a robot's encoders remember, and what they draw from.
+/// The state of a robot's encoders, and their random stream.
 #[derive(Clone)]
 pub struct EncoderState {
-    /// Per source of all stimuli: v and substeps to wait, or survival.
+    /// Per source of all stimuli: v and refractory substeps, or survival.
     nodes: Vec<[f64; 2]>,
     stream: Stream,
 }
 
-/// The encoders of a network, in the order of its stimuli. `covered`: weights that the
-/// genotype has, as number of the encoder, number of the weight, value.
+/// The encoders of a network, in the order of its stimuli. `covered`: weights in the genotype, as
+/// number of the encoder, number of the weight, value.
 pub fn encoders(topology: &TopologyConfig, covered: &[(usize, usize, f64)]) -> Vec<Encoder> {
     let mut encoders = Vec::new();
     let (mut value, mut source) = (0, 0);
@@ -122,7 +122,7 @@ impl Encoder {
 }
 
 impl EncoderState {
-    /// Before the first step, of as many sources.
+    /// The state before the first step, with `n_sources` sources.
     pub fn new(encoders: &[Encoder], n_sources: usize, stream: Stream) -> Self {
         let mut nodes = vec![[0.0; 2]; n_sources];
         for encoder in encoders {
@@ -132,8 +132,8 @@ impl EncoderState {
         Self { nodes, stream }
     }
 
-    /// What synapses get from the sources of all stimuli in a substep of `n_substeps`, and
-    /// which sources spike.
+    /// The inputs of synapses from the sources of all stimuli in a substep of `n_substeps`, and
+    /// whether each source spikes.
     pub fn encode(
         &mut self,
         encoders: &[Encoder],

@@ -25,9 +25,9 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / n as f64
 }
 
-/// Experiment A, Eq. 5.2-5.3 in the reading under which F* = 2.45: min(0.1 c, 5)
-/// with exactly one leader, c being the number of consecutive previous steps in
-/// which it was that already; else 0.
+/// Experiment A, Eq. 5.2-5.3 in the reading under which F* = 2.45: min(0.1 c, 5) with exactly one
+/// leader, where c is the number of directly preceding steps in which the same robot was the sole
+/// leader; otherwise 0.
 pub fn identify_leader(leader: &SoleLeader) -> f64 {
     match leader.robot {
         Some(_) => (0.1 * f64::from(leader.n_steps - 1)).min(5.0),

@@ -1,4 +1,4 @@
-//! Plasticity: a robot's own weights, and what they depend on.
+//! Plasticity: a robot's own weights, with the activities and rewards on which they depend.
 
 use experiment_file::{ExperimentConfig, LearningConfig};
 
@@ -9,18 +9,18 @@ pub struct Learner<'a> {
     experiment: &'a ExperimentConfig,
     config: &'a LearningConfig,
     weights: Vec<f64>,
-    /// Of each synapse.
+    /// The ends of each synapse.
     ends: Vec<Ends>,
     /// A, B, C and D of each group.
     coefficients: Vec<[f64; 4]>,
     /// Activities of neurons, and then of sources of stimuli, after each step.
     activities: Vec<Vec<f64>>,
-    /// What followed each step.
+    /// The reward of each step.
     rewards: Vec<f64>,
 }
 
 impl<'a> Learner<'a> {
-    /// None if no weight changes.
+    /// The learner of a genotype; `None` if no weight is plastic.
     pub fn new(experiment: &'a ExperimentConfig, genotype: &[f64]) -> Option<Self> {
         let config = experiment.topology.learning.as_ref()?;
         let Decoded { weights, coefficients, .. } = decode_genes(experiment, genotype);
@@ -35,17 +35,17 @@ impl<'a> Learner<'a> {
         })
     }
 
-    /// After a step.
+    /// Stores the activities of a step.
     pub fn remember(&mut self, activities: Vec<f64>) {
         self.activities.push(activities);
     }
 
-    /// What followed from the step.
+    /// Stores the reward of the step.
     pub fn reward(&mut self, reward: f64) {
         self.rewards.push(reward);
     }
 
-    /// Before a step: the weights that hold in it.
+    /// Changes the weights before a step, and returns them.
     pub fn learn(&mut self) -> Matrices {
         let delay = self.config.reward.map_or(1, |reward| reward.delay as usize);
         if self.activities.len() >= delay {

@@ -7,7 +7,7 @@ use experiment_file::{LightController, LightParams, LightSourceConfig};
 
 use super::torus::{Torus, Vector, norm};
 
-/// A light and the state of what moves it.
+/// A light and the state of its motion.
 pub struct Light<'a> {
     config: &'a LightSourceConfig,
     pub position: Vector,

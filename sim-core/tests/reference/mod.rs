@@ -1,9 +1,9 @@
-//! The simulation, transcribed from its equations a second time: one robot at a
-//! time, plain structs, dense matrices, `f64` throughout. It is slow and obvious
-//! on purpose, because it is what the simulator is compared with.
+//! The simulation, transcribed from its equations a second time: one robot at a time, plain
+//! structs, dense matrices, `f64` throughout. It is deliberately slow and obvious, because tests
+//! compare the simulator with it.
 //!
-//! Of the crate it uses the types of a configuration and the random streams
-//! (addresses and draw order are part of the specification), nothing else.
+//! From the project, it uses only the types of a configuration and the random streams (addresses
+//! and order of draws are part of the specification).
 #![allow(
     clippy::disallowed_methods,
     reason = "independence from the simulator's arithmetic, libm included, is the point"
@@ -36,7 +36,7 @@ use experiment_file::ExperimentConfig;
 pub struct Episode {
     /// Fitness of the trial.
     pub fitness: f64,
-    /// What happened on the way.
+    /// The events of the episode.
     pub witness: Witness,
 }
 

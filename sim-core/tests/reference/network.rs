@@ -1,5 +1,5 @@
-//! The controller: which synapses exist, what a genotype means (section 3.4.2),
-//! and the CTRNN's dynamics (sections 2.1 and 3.4.1), with dense matrices.
+//! The controller: the existing synapses, the decoding of genotypes (section 3.4.2), and the
+//! CTRNN's dynamics (sections 2.1 and 3.4.1), with dense matrices.
 
 use std::ops::Range;
 
@@ -11,20 +11,20 @@ use experiment_file::{
 
 use super::{encoding, spiking};
 
-/// What a gene encodes.
+/// The parameter that a gene encodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gene {
     /// Weight of the synapse of this number.
     Weight(usize),
     /// Parameter of the neuron of this number.
     Neuron(&'static str, usize),
-    /// Of an output: weight of its decoding.
+    /// Weight of the decoding of an output, by number of the output.
     Decoder(usize, usize),
-    /// Delay of the neuron of this number; after the neurons come the sources of stimuli.
+    /// Delay of the neuron of this number; numbers after the last neuron are sources of stimuli.
     Delay(usize),
-    /// Of an encoder: weight of its receptive field.
+    /// Weight of the receptive field of an encoder, by number of the encoder.
     Encoder(usize, usize),
-    /// Of a group of synapses: A, B, C or D.
+    /// Coefficient A, B, C or D of a group of synapses, by number of the group.
     Coefficient(usize, usize),
 }
 
@@ -51,7 +51,7 @@ struct Synapse {
     post: usize,
 }
 
-/// Numbers of what synapses can start from in a stimulus, if there is one of this name.
+/// Numbers of the sources of a stimulus, if there is one of this name.
 fn inputs_of(topology: &TopologyConfig, name: &str) -> Option<Range<usize>> {
     let mut start = 0;
     for stimulus in topology.stimuli.keys() {
@@ -188,7 +188,7 @@ fn ensembles(topology: &TopologyConfig, selector: &EnsembleSelector) -> Range<us
     }
 }
 
-/// What has a delay: neurons, then sources of encoded stimuli.
+/// The axons with a delay: neurons, then sources of encoded stimuli.
 fn axons(topology: &TopologyConfig, selector: &EnsembleSelector) -> Vec<usize> {
     let n = n_neurons(topology);
     let of_stimulus = |name: &str| {
@@ -206,7 +206,7 @@ fn axons(topology: &TopologyConfig, selector: &EnsembleSelector) -> Vec<usize> {
     }
 }
 
-/// What each gene of the experiment's genotypes encodes.
+/// The parameters that the genes of the experiment's genotypes encode.
 pub fn genes(config: &ExperimentConfig) -> Vec<Gene> {
     bounded_genes(config, &synapses(&config.topology)).iter().map(|bounded| bounded.gene).collect()
 }
@@ -215,7 +215,7 @@ fn n_neurons(topology: &TopologyConfig) -> usize {
     topology.ensembles.values().map(|ensemble| ensemble.n as usize).sum()
 }
 
-/// What synapses can start from in all stimuli.
+/// Number of sources of all stimuli.
 pub fn n_inputs(topology: &TopologyConfig) -> usize {
     topology.stimuli.keys().map(|stimulus| topology.n_sources(stimulus) as usize).sum()
 }
@@ -231,7 +231,7 @@ pub struct Matrices {
     pub w_receptors: [Vec<Vec<f64>>; 3],
 }
 
-/// Where a synapse is.
+/// The ends of a synapse.
 pub struct Ends {
     pub group: String,
     pub group_idx: usize,
@@ -240,7 +240,7 @@ pub struct Ends {
     pub post: usize,
 }
 
-/// Where each synapse is.
+/// The ends of each synapse.
 pub fn ends(topology: &TopologyConfig) -> Vec<Ends> {
     let of_synapse = |synapse: Synapse| Ends {
         group: synapse.group,
@@ -254,11 +254,11 @@ pub fn ends(topology: &TopologyConfig) -> Vec<Ends> {
     synapses(topology).into_iter().map(of_synapse).collect()
 }
 
-/// What a genotype encodes.
+/// The decoded values of a genotype.
 pub struct Decoded {
     /// By number of the synapse.
     pub weights: Vec<f64>,
-    /// The same.
+    /// The weights as matrices.
     pub matrices: Matrices,
     /// By number of the group: A, B, C and D of plasticity.
     pub coefficients: Vec<[f64; 4]>,
@@ -361,8 +361,8 @@ pub struct Network {
 }
 
 impl Network {
-    /// Decodes a genotype: x * (max - min) + min, and 2 * 10^that for tau. What
-    /// no query covers keeps its default; such weights are drawn from U(-1, 1).
+    /// Decodes a genotype: y = x * (max - min) + min, and 2 * 10^y for tau. Parameters that no
+    /// query covers keep their defaults; such weights are drawn from U(-1, 1).
     pub fn decode(config: &ExperimentConfig, genotype: &[f64]) -> Self {
         let topology = &config.topology;
         let Decoded { matrices, neurons, .. } = decode_genes(config, genotype);

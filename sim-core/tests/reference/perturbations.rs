@@ -1,4 +1,4 @@
-//! What goes wrong in a swarm (chapter 6).
+//! Perturbations of a swarm (chapter 6).
 
 use determinism::random::Stream;
 use experiment_file::{
@@ -58,7 +58,7 @@ pub struct SoleLeader {
 }
 
 impl SoleLeader {
-    /// Takes in the colours of one step.
+    /// Observes the LED colours of one step.
     pub fn observe(&mut self, leds: &[u32]) {
         let lit: Vec<usize> = (0..leds.len()).filter(|&robot| leds[robot] > 0).collect();
         let leader = if let [robot] = lit[..] { Some(robot) } else { None };

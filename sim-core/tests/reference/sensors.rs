@@ -1,5 +1,4 @@
-//! The sensors of section 3.2.2. Each returns its readings without knowing who
-//! asks for them.
+//! The sensors of section 3.2.2. Each returns its readings independently of their use.
 
 use determinism::random::Stream;
 use experiment_file::{DistanceSensorConfig, LightSensorConfig, SensorQuery};
@@ -50,7 +49,7 @@ impl Readings {
             SensorQuery::Nest => vec![self.nest],
             SensorQuery::OwnPosition => self.position.to_vec(),
             SensorQuery::OwnOrientation => vec![self.orientation],
-            // Nothing but a script has robots carry anything.
+            // Only a script lets robots carry something.
             SensorQuery::Food => vec![0.0],
             SensorQuery::NeighborhoodPos => self.neighborhood.clone(),
             SensorQuery::Script => panic!("no equation is given"),
@@ -117,8 +116,8 @@ pub fn distance(
     readings
 }
 
-/// Places and headings of the `n` nearest other robots, the nearest first, of equally near ones
-/// the first; zeros where there are none.
+/// Places and headings of the `n` nearest other robots, nearest first, with ties by number; zeros
+/// for missing robots.
 pub fn neighborhood(n: usize, own_idx: usize, robots: &[Robot<'_>], torus: Torus) -> Vec<f64> {
     let own = &robots[own_idx];
     let mut others: Vec<&Robot<'_>> = robots

@@ -22,26 +22,26 @@ pub struct SpikingNetwork {
     params: Vec<NamedMap<f64>>,
     /// Per output.
     decoders: Vec<Vec<f64>>,
-    /// Of dynamic synapses.
+    /// The receptors of dynamic synapses.
     receptors: Option<SynapseParams>,
-    /// Per neuron, and then per source of stimuli: substeps.
+    /// Delays in substeps, per neuron, and then per source of stimuli.
     delays: Vec<usize>,
     encoders: Vec<Encoder>,
 }
 
-/// What a robot's network remembers, per neuron.
+/// The state of a robot's network, per neuron.
 #[derive(Clone, Default)]
 pub struct SpikingState {
-    /// v and what else the model has.
+    /// v and the other variables of the model.
     neurons: Vec<[f64; 3]>,
     spikes: Vec<bool>,
-    /// The spikes of all substeps so far of neurons and sources of stimuli, of dynamic
-    /// synapses.
+    /// With dynamic synapses, the spikes of neurons and sources of stimuli in all substeps so
+    /// far.
     history: Vec<Vec<bool>>,
-    /// None of rate neurons.
+    /// `None` for rate neurons.
     encoders: Option<EncoderState>,
-    /// After a step, of neurons and sources of stimuli: the share of substeps with a spike, or
-    /// the mean value.
+    /// Activities of neurons and sources of stimuli after a step: the share of substeps with a
+    /// spike, or the mean value.
     pub activities: Vec<f64>,
     /// s_ampa, s_gaba, x, s_nmda
     open: Vec<[f64; 4]>,
@@ -136,7 +136,7 @@ impl SpikingNetwork {
         self.matrices = matrices;
     }
 
-    /// Before the first step; encoders draw from the stream.
+    /// The state before the first step; encoders draw from the stream.
     pub fn rest(&self, stream: Stream) -> SpikingState {
         let start = |p: &NamedMap<f64>| match self.model {
             NeuronModel::Rate => panic!("rate neurons do not spike"),
@@ -206,7 +206,7 @@ impl SpikingNetwork {
         self.act(topology, state, &window, msg_length)
     }
 
-    /// Receptors open where a spike arrives, and close.
+    /// Opens receptors at arriving spikes, and lets them close.
     fn release(&self, params: &SynapseParams, state: &mut SpikingState) {
         let SynapseParams { ampa, gaba, nmda } = params;
         let now = state.history.len();

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 /// A point, or a displacement, in cm.
 pub type Vector = [f64; 2];
 
-/// The rectangle [0, W) x [0, H) whose opposite sides are one.
+/// The rectangle [0, W) x [0, H) whose opposite sides are joined.
 #[derive(Clone, Copy)]
 pub struct Torus {
     pub width: f64,
@@ -13,7 +13,7 @@ pub struct Torus {
 }
 
 impl Torus {
-    /// The representative of a point in [0, W) x [0, H).
+    /// The same point with coordinates in [0, W) x [0, H).
     pub fn wrap(self, [x, y]: Vector) -> Vector {
         [wrap_once(x, self.width), wrap_once(y, self.height)]
     }

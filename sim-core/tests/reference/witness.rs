@@ -1,11 +1,11 @@
-//! What happened in an episode, so that a test can tell that it tested something.
+//! Events of an episode, so that a test can check that its subject occurred.
 
-/// Counts of what happened.
+/// Counts of events.
 #[derive(Clone, Debug, Default)]
 pub struct Witness {
     /// Robot-steps in which a frame was received.
     pub n_receptions: usize,
-    /// ... that came by another robot than its originator.
+    /// Robot-steps in which a relayed frame was received.
     pub n_relayed_receptions: usize,
     /// Largest number of hops of a received frame.
     pub max_hops: u32,
@@ -28,9 +28,9 @@ pub struct Witness {
     pub n_inhibited: usize,
     /// Robot-steps with wheel actions that the network did not decide.
     pub n_uncontrollable: usize,
-    /// Robot-steps off the border, if the fitness asks.
+    /// Robot-steps in the interior, if the fitness uses them.
     pub n_interior: usize,
-    /// Times that positions were redrawn.
+    /// Number of redraws of positions.
     pub n_redrawn: usize,
     /// Steps with a fitness other than 0.
     pub n_rewarded: usize,

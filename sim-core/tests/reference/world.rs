@@ -19,13 +19,13 @@ use super::spiking::SpikingState;
 use super::torus::{Torus, Vector};
 use super::witness::Witness;
 
-/// A robot: what it is, where it is, what it did in the last step.
+/// A robot: its configuration, its pose, and its last actions.
 pub struct Robot<'a> {
     pub config: &'a RobotConfig,
     object_idx: usize,
     pub position: Vector,
     pub heading: f64,
-    /// Its weights change if it learns.
+    /// Its network, whose weights change if it learns.
     network: Controller,
     learner: Option<Learner<'a>>,
     /// State of the network, of rate neurons.
@@ -35,12 +35,12 @@ pub struct Robot<'a> {
     /// Mode in force: send (or relay).
     pub send: bool,
     pub led: u32,
-    /// Right and left.
+    /// Actions of the right and left wheel.
     pub wheels: [f64; 2],
     pub on_air: Option<Frame>,
     pub received: Option<Reception>,
     pub is_faulty: bool,
-    /// Per entry of `stimuli_inhibition`.
+    /// Whether it is affected, per entry of `stimuli_inhibition`.
     is_inhibited: Vec<bool>,
     is_uncontrollable: bool,
     reception: Stream,
@@ -58,14 +58,14 @@ impl Robot<'_> {
         self.config.sensors.wireless_receiver.as_ref().expect("emitters have sectors").n_sectors
     }
 
-    /// Distance under which two robots of this kind hear each other.
+    /// Distance below which two robots of this kind hear each other, cm.
     pub fn communication_range(&self) -> f64 {
         let receiver = self.config.sensors.wireless_receiver.as_ref();
         let receiver = receiver.expect("the fitness asks who hears whom");
         receiver.range.min(self.transmitter().range)
     }
 
-    /// M; 0 without a wireless link.
+    /// Message length M; 0 without a wireless link.
     fn msg_length(&self) -> usize {
         let sensors = &self.config.sensors;
         let actuators = &self.config.actuators;
@@ -253,7 +253,7 @@ impl<'a> Simulation<'a> {
         fitness
     }
 
-    /// `topology_switch`: new positions in every `every`-th step but the first.
+    /// `topology_switch`: new positions in every `every`-th step except the first.
     fn switch_topology(&mut self) {
         for (object_idx, object) in self.config.world.objects.values().enumerate() {
             let ObjectConfig::Robot(config) = object else { continue };
@@ -433,7 +433,7 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// The robots that evolve: fitness is about them alone.
+    /// The robots that evolve, which alone are evaluated.
     fn evaluated_robots(&self) -> std::ops::Range<usize> {
         let evolvable = &self.config.algorithm.evolvable_object;
         let object_idx = self.config.world.objects.get_index_of(evolvable);
@@ -491,7 +491,7 @@ fn a_relayed_frame_moves_one_hop_per_step() {
         let reception = heard[step].as_ref().expect("checked above");
         assert_eq!((reception.originator, reception.hops), (0, step as u32));
         assert_eq!(reception.message, [1.0, 0.0]);
-        // Robot 0 heads east: its sector 0 faced robot 1, and every relay says so.
+        // Robot 0 heads east: its sector 0 faced robot 1, and every relayed frame carries this.
         assert_eq!(reception.original_direction, [1.0, 0.0]);
         for (robot, heard) in simulation.robots.iter_mut().zip(&heard) {
             robot.on_air = Some(Frame::relayed(heard.as_ref(), 2));
