@@ -76,7 +76,7 @@ fn new_experiment() -> NewExperiment {
     }
 }
 
-/// An experiment with 12 generations; one in a hundred goes on.
+/// An experiment with 12 generations; one in a hundred is unfinished.
 fn put(store: &mut Store, new: &NewExperiment, i: usize) {
     let mut new = new.clone();
     new.config.name = format!("run-{i}");

@@ -59,7 +59,7 @@ pub enum LocalRunError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// The stored state does not allow the experiment to continue.
-    #[error("experiment {0} cannot go on: {1}; start again in another data directory")]
+    #[error("experiment {0} cannot continue: {1}; start again in another data directory")]
     Unsound(ExperimentId, String),
     /// The limit of unfinished experiments is reached.
     #[error("{UNFINISHED_MAX} experiments of this data directory are unfinished; take another one")]

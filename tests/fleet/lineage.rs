@@ -58,7 +58,7 @@ fn a_lineage_names_parents_that_have_the_genes() {
         }
     }
     for (address, code, what) in [
-        ("1@3", 2, "is no individual"),
+        ("1@3", 2, "is not an individual"),
         ("1@3/10", 2, "has no individual 10"),
         ("1@4/0", 3, "generation 4 of experiment 1 is not complete"),
         ("2@0/0", 2, "its individuals have no parents"),

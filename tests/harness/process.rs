@@ -1,4 +1,4 @@
-//! Processes under test, and what they print.
+//! Processes under test, and their output.
 
 use std::{
     ffi::OsStr,

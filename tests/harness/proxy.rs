@@ -103,7 +103,7 @@ impl Proxy {
         });
     }
 
-    /// Makes the network whole, and delivers what was held.
+    /// Heals the network, and delivers the held bytes.
     pub fn heal(&self) {
         self.shared.change(|state| (state.is_held, state.is_cut) = ([false; 2], false));
     }

@@ -202,9 +202,7 @@ async fn watch_over(lifetime: Lifetime, stats: Arc<Stats>, shutdown: Cancellatio
             Some(Expired::Idle) => "idle for the time of --idle-timeout",
             Some(Expired::TimeIsNear) => "near the end of --time-limit",
             Some(Expired::TimeIsUp) => {
-                warn!(
-                    "the time of --time-limit is over before all items are done: other workers compute them"
-                );
+                warn!("the time of --time-limit is over before all items are done: others do them");
                 std::process::exit(0);
             }
         };

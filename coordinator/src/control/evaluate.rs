@@ -116,7 +116,7 @@ impl Control {
     }
 
     /// Has the fleet evaluate a genotype, after waiting for one of the places for evaluations.
-    /// Dropping the future tells the driver that nobody waits.
+    /// Dropping the future tells the driver that the client has gone.
     pub async fn evaluate(&self, checked: CheckedEvaluation) -> Result<Evaluated, ControlError> {
         let CheckedEvaluation { evaluation, place, .. } = checked;
         let n_values = evaluation.batch.values_per_trial;

@@ -67,7 +67,7 @@ impl FitnessOrder {
 
 impl Control {
     /// Has the fleet compute the fitness of each genotype in every trial. Dropping the future
-    /// tells the driver that nobody waits.
+    /// tells the driver that the client has gone.
     pub async fn fitness(&self, mut order: FitnessOrder) -> Result<Vec<Vec<f64>>, ControlError> {
         // Lists that grew while they were read have spare capacity.
         order.genotypes.iter_mut().for_each(Vec::shrink_to_fit);

@@ -53,7 +53,8 @@ fn check(bytes: &[u8], memory_budget: u64) -> Result<Imported, ControlError> {
     let champion = verification.finish().champion;
     let state = ExperimentState::from_name(&bundle.manifest.state);
     let state = state.filter(|state| !state.is_unfinished());
-    let state = state.ok_or_else(|| invalid(&"it says of no end that there is"))?;
+    let state = state
+        .ok_or_else(|| invalid(&"its manifest does not have the state of an ended experiment"))?;
     Ok(Imported { name: config.name, genotype_len, state, champion, fork: None, bundle })
 }
 

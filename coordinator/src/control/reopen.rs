@@ -48,7 +48,7 @@ impl Control {
             let ready = DriverEvent::ExperimentReady(Box::new(runnable));
             events.send(ready).await.map_err(|_| ControlError::ShuttingDown)
         });
-        reopening.await.map_err(|_| ControlError::Panicked("going on with the experiment"))??;
+        reopening.await.map_err(|_| ControlError::Panicked("continuing the experiment"))??;
         self.find(id).await
     }
 }
@@ -63,7 +63,9 @@ fn prepare(
     let experiment = queries::experiment(store, id)?;
     let config_json = config_of(&experiment, reopening)?;
     if let Some(incompatible) = queries::incompatibility(&experiment) {
-        return Err(ControlError::NotNow(format!("experiment {id} cannot go on: {incompatible}")));
+        return Err(ControlError::NotNow(format!(
+            "experiment {id} cannot continue: {incompatible}"
+        )));
     }
     // More generations need no more memory.
     placement::check_room(store, &experiment.summary, experiment.genotype_len, memory_budget)?;
@@ -91,8 +93,8 @@ fn config_of(experiment: &StoredExperiment, reopening: Reopening) -> Result<Stri
             longer(experiment, generations)
         }
         (Reopening::Extend(_), Completed) => not_now(format!(
-            "has completed before its last generation: {}; go on from that one under another \
-             target with: swarmctl fork {id}@{} --set algorithm.target_fitness=F",
+            "has completed before its last generation: {}; continue from there with another \
+             target: swarmctl fork {id}@{} --set algorithm.target_fitness=F",
             experiment.reason,
             experiment.n_generations().saturating_sub(1)
         )),
@@ -101,11 +103,11 @@ fn config_of(experiment: &StoredExperiment, reopening: Reopening) -> Result<Stri
         }
         (Reopening::Retry, Running) => not_now("is running already".to_owned()),
         (_, Paused) => not_now(format!("is paused; continue it with: swarmctl resume {id}")),
-        (_, Failed) => not_now(format!("has failed; go on with: swarmctl resume {id}")),
-        (_, Cancelled) => not_now(format!("was cancelled; go on with: swarmctl resume {id}")),
-        (_, Completed) => {
-            not_now(format!("has completed; go on with: swarmctl resume {id} --generations N"))
-        }
+        (_, Failed) => not_now(format!("has failed; continue it with: swarmctl resume {id}")),
+        (_, Cancelled) => not_now(format!("was cancelled; continue it with: swarmctl resume {id}")),
+        (_, Completed) => not_now(format!(
+            "has completed; continue it with: swarmctl resume {id} --generations N"
+        )),
         (Reopening::Resume, Running) => Ok(config_json.clone()),
     }
 }

@@ -18,7 +18,8 @@ use crate::{
 
 use super::{Control, ControlError, Explanation};
 
-/// A round waits for its last items if workers have held them for so long.
+/// Time for which workers must have had a round's last items before the round counts as waiting
+/// for them.
 const LONG: Duration = Duration::from_secs(10);
 
 /// The parts of an explanation whose change leads to another message.

@@ -65,7 +65,7 @@ impl Driver {
     pub(super) fn send(&mut self, id: WorkerId, message: ToWorker) {
         let Some(worker) = self.workers.get(&id) else { return };
         if worker.link.outbox.try_send(message).is_err() {
-            self.on_worker_left(id, "it does not read what it is sent");
+            self.on_worker_left(id, "it does not read its messages");
         }
     }
 

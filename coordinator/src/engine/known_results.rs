@@ -99,7 +99,7 @@ impl KnownResults {
         parts
     }
 
-    /// Whether a worker's numbers agree with what is known.
+    /// Compares a worker's numbers with the known results.
     pub fn compare(&self, item: &Item, numbers: &[f64]) -> Result<(), Disagreement> {
         for (trial, values) in item.trials.clone().zip(numbers.chunks_exact(self.values_per_trial))
         {

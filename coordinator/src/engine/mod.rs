@@ -216,7 +216,7 @@ impl Engine {
         }
     }
 
-    /// A worker wants no more items. It will finish what it computes and leave.
+    /// A worker wants no more items. It will finish its items in progress, and leave.
     pub fn on_draining(&mut self, now: Instant, id: WorkerId) {
         self.on_heartbeat(now, id);
         if self.workers.contains_key(&id) {

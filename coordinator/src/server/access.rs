@@ -24,7 +24,7 @@ pub struct Tokens {
     worker: Token,
 }
 
-/// What a peer may do.
+/// The rights of a peer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Submit, read, cancel.

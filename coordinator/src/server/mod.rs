@@ -142,11 +142,11 @@ impl Coordinator {
                 Unusable::Damaged(why) => RunError::Damaged(why),
             },
             Some(ended) = self.core.driver.join_next() => RunError::Driver(match ended {
-                Ok(()) => "nobody asked it to".to_owned(),
+                Ok(()) => "without a request to stop".to_owned(),
                 Err(error) => error.to_string(),
             }),
             Some(ended) = self.server.join_next() => RunError::Server(match ended {
-                Ok(Ok(())) => "nobody asked it to".to_owned(),
+                Ok(Ok(())) => "without a request to stop".to_owned(),
                 Ok(Err(error)) => error.to_string(),
                 Err(error) => error.to_string(),
             }),

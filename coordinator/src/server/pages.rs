@@ -44,7 +44,7 @@ impl Builder {
     }
 }
 
-/// Serves until shutdown. Evolution goes on without pages.
+/// Serves until shutdown. Errors end only the pages, not the evolution.
 pub async fn serve(site: Site, listener: TcpListener, shutdown: CancellationToken) {
     if let Err(error) = site.serve(listener, shutdown).await {
         error!("pages are no longer served: {error}");

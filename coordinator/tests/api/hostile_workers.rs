@@ -35,7 +35,7 @@ use tonic::{
     transport::{Channel, Endpoint},
 };
 
-/// Only a coordinator that hangs takes so long.
+/// A deadline that only a hanging coordinator misses.
 const DEADLINE: Duration = Duration::from_secs(60);
 /// More memory than any messages may make the coordinator hold.
 const RESIDENT_KB_MAX: u64 = 1 << 20;

@@ -19,7 +19,7 @@ use tokio::time::{sleep, timeout};
 const COORDINATOR: &str = env!("CARGO_BIN_EXE_coordinator");
 /// A long idle time, which no test reaches.
 const LONG: Duration = Duration::from_secs(600);
-/// Only a referee that hangs takes so long.
+/// A deadline that only a hanging referee misses.
 const DEADLINE: Duration = Duration::from_secs(60);
 
 /// The quickstart, with changes.
@@ -76,7 +76,7 @@ struct Traced {
 impl Traced {
     fn new(idle_time: Duration) -> Self {
         let directory = tempfile::tempdir().unwrap();
-        // Under `nohup`, and behind `&`, tests and what they start would ignore signals.
+        // Under `nohup`, and behind `&`, tests and their child processes would ignore signals.
         let line = format!(
             "echo $$ > {}; exec env --default-signal $0 referee",
             pid_file(directory.path()).display()

@@ -137,7 +137,7 @@ pub enum BundleError {
     Malformed {
         /// The file.
         file: &'static str,
-        /// What is wrong.
+        /// The mistake in it.
         what: String,
     },
     /// A file whose digest is not the one in the description.

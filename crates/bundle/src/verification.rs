@@ -250,7 +250,9 @@ impl<'a> Verification<'a> {
             batches.extend(rounds.into_iter().map(Batch::from_round));
             let n_trials = self.n_trials as usize;
             if told.trial_fitness.iter().any(|trials| trials.len() != n_trials) {
-                return Err(Claim::Simulation.flaw(at(&format!("it has not {n_trials} trials"))));
+                return Err(
+                    Claim::Simulation.flaw(at(&format!("it does not have {n_trials} trials")))
+                );
             }
         }
         let has_end = !told.end.blocks.is_empty() || !told.end.judgement.is_empty();
@@ -356,7 +358,7 @@ impl<'a> Verification<'a> {
 /// same shape.
 fn fork_start(bundle: &Bundle, own: Digest, new: &Evolution) -> Result<Evolution, Flaw> {
     let flaw = |what: &dyn fmt::Display| Claim::Chain.flaw(format!("where it was forked: {what}"));
-    let Some(fork) = &bundle.manifest.fork else { return Err(flaw(&"it is no fork")) };
+    let Some(fork) = &bundle.manifest.fork else { return Err(flaw(&"it is not a fork")) };
     let parent = bundle.history.get(fork.generation as usize);
     let parent = parent.ok_or_else(|| flaw(&"there is no such generation"))?.digest;
     if fork.link != parent && fork.link != parent.forked(own) {

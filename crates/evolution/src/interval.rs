@@ -90,7 +90,7 @@ mod tests {
     use super::*;
     use crate::statistics::tests::any_finite;
 
-    /// Fitness of 200 trials, of which 8 fail.
+    /// Fitness of 200 trials, with 8 failures.
     fn rarely_fails() -> Vec<f64> {
         (0..200).map(|i| if i % 25 == 0 { 0.01 } else { 0.9 + 0.0004 * f64::from(i) }).collect()
     }

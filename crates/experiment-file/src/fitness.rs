@@ -17,7 +17,7 @@ pub(crate) enum Need {
     Light,
     /// The file brings a script.
     Script,
-    /// An episode is longer than so many steps, which do not count.
+    /// An episode is longer than this many first steps, which do not count.
     StepsBeyond(u32),
 }
 

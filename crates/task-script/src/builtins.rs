@@ -423,7 +423,7 @@ fn whole(value: f64) -> Outcome<Value> {
     if value.abs() <= LARGEST {
         Ok(Value::Int(value as i64))
     } else {
-        Err(format!("{value} is no whole number of 64 bits").into())
+        Err(format!("{value} is not a whole number of 64 bits").into())
     }
 }
 

@@ -181,7 +181,7 @@ fn what_goes_wrong_is_said_with_its_line() {
         ("return sorted([1, 'a'])", "have no order"),
         ("return max([])", "empty"),
         ("fail('robot', 3, 'is lost')", "robot 3 is lost"),
-        ("return int(1e300)", "no whole number of 64 bits"),
+        ("return int(1e300)", "not a whole number of 64 bits"),
         ("return [1, 2].push(1)", ""),
         ("return -[1]", "`-` takes a number"),
         ("for i in 3: pass", "expected a list, found int"),

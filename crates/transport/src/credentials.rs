@@ -12,7 +12,7 @@ use crate::{Expiries, Identity, PemError, Token, TokenError, certificates};
 pub struct Credentials {
     /// Sent with every call.
     pub token: Option<Token>,
-    /// Authorities one of which must have signed the coordinator's certificate.
+    /// Authorities; one of them must have signed the coordinator's certificate.
     pub authorities: Option<Certificate>,
     /// Client certificate, for a coordinator that requires one.
     pub identity: Option<Identity>,

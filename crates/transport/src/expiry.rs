@@ -31,8 +31,8 @@ pub struct Expiry {
 }
 
 impl Expiries {
-    /// The expiry dates of a certificate chain, all of whose certificates are needed, and of
-    /// authorities, of which one is enough. Ignores unreadable files, which other code reports.
+    /// The expiry dates of a certificate chain, which needs all of its certificates, and of
+    /// authorities, where one is enough. Ignores unreadable files, which other code reports.
     pub fn from_files(chain: Option<&Path>, authorities: Option<&Path>) -> Self {
         let chain = chain.and_then(|path| Some((path, ends(path).into_iter().min()?)));
         let authorities = authorities.and_then(|path| Some((path, ends(path).into_iter().max()?)));

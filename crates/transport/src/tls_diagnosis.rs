@@ -56,7 +56,7 @@ fn explain(error: &TlsError) -> String {
         ) => "its certificate is for another name; pass that with --tls-domain".into(),
         TlsError::InvalidCertificate(CertificateError::ExpiredContext { not_after, .. }) => {
             format!(
-                "its certificate expired on {}; whoever runs it needs a new one \
+                "its certificate expired on {}; its operator needs to make a new one \
                  (docs/security.md), unless the clock of this machine is wrong",
                 date(not_after.as_secs())
             )

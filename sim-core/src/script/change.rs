@@ -30,7 +30,7 @@ impl May<'_> {
     /// The advice in the error for any other change.
     fn advice(&self) -> &'static str {
         match self {
-            Self::Look => "what is to be remembered goes into `state`, a dict",
+            Self::Look => "keep values for later in `state`, a dict",
             Self::Sense { .. } => "`sense` returns a list of numbers, and `state` is a dict",
             Self::Act { .. } => {
                 "`control` sets `left`, `right`, `led`, `mode` and `message` of its own robot, and \

@@ -236,7 +236,7 @@ impl<'a> ScriptRun<'a> {
                 value => Err(task.program.problem(
                     function,
                     format!(
-                        "returns a {}; a robot acts by what is assigned, such as `robot.left = 0.5`",
+                        "returns a {}; assign a robot's actions instead, such as `robot.left = 0.5`",
                         value.kind()
                     ),
                 )),

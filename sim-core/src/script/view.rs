@@ -183,7 +183,7 @@ impl<'a> View<'a> {
         };
         let number = object.index as usize;
         let found = groups.iter().find(|group| group.members.contains(&number));
-        found.ok_or_else(|| "there is no such thing".into())
+        found.ok_or_else(|| "there is no such object".into())
     }
 
     fn of_world(&mut self, name: Named, meter: &Rc<Meter>) -> Answer {

@@ -1,4 +1,4 @@
-//! Forks: what they share with their parents, and what they refuse.
+//! Forks: the data that they share with their parents, and the changes that they refuse.
 
 use super::*;
 

@@ -47,8 +47,8 @@ fn evolvable_object(config: &ExperimentConfig, report: &Report<'_>) {
             if robot.controller == RobotController::ScriptController {
                 return report.warning(&object_path.key("controller"), || {
                     format!(
-                        "`{name}` does what the script says, whatever its genotype: this can be \
-                         evaluated, but nothing of it evolves"
+                        "the script controls `{name}`, whatever its genotype: it can be \
+                         evaluated, but it does not evolve"
                     )
                 });
             } else if robot.controller != RobotController::NeuralController {

@@ -10,8 +10,8 @@ pub(super) fn task(o: &mut Object<'_>) -> TaskConfig {
 fn script(node: Node<'_>) -> ScriptConfig {
     if node.is_string() {
         node.problem(
-            "is the path of a file, which nobody has read; `swarmctl` reads it when it is given \
-             the experiment file; expected an object of `name` and `text`",
+            "is the path of a file that has not been read; `swarmctl` reads it if it gets the \
+             experiment file; expected an object of `name` and `text`",
         );
         return ScriptConfig { name: String::new(), text: String::new() };
     }

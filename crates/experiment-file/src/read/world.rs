@@ -108,7 +108,7 @@ pub(super) fn orientations(node: Option<Node<'_>>) -> Initializer {
     node.object(read).unwrap_or(Initializer::Fixed { values: vec![vec![0.0]] })
 }
 
-/// Defaults of values of so many components.
+/// Defaults for values with `n` components.
 fn of_components(n: u32, low: f64, high: f64) -> [(&'static str, ParameterValue); 4] {
     let values = vec![vec![0.0; n as usize]];
     [("values", values.into()), ("low", low.into()), ("high", high.into()), ("size", n.into())]

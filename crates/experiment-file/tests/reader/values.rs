@@ -289,7 +289,7 @@ fn robots_lights_and_areas_may_be_left_to_the_script() {
     assert_eq!(config.robots().next().unwrap().1.controller, RobotController::ScriptController);
     let warning =
         warnings.iter().find(|warning| warning.path == "world.objects.bots.controller").unwrap();
-    assert!(warning.message.ends_with("but nothing of it evolves"), "{}", warning.message);
+    assert!(warning.message.ends_with("but it does not evolve"), "{}", warning.message);
 }
 
 pub(super) fn lamp(config: &ExperimentConfig) -> &LightSourceConfig {

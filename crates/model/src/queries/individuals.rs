@@ -31,7 +31,7 @@ impl Reader {
         let request =
             GetIndividualsRequest { address: address.into(), ..GetIndividualsRequest::default() };
         let found = self.get_individuals(request).await?.individuals.pop();
-        found.ok_or_else(|| Status::invalid_argument(format!("`{address}` is nobody")))
+        found.ok_or_else(|| Status::invalid_argument(format!("`{address}` names no genotype")))
     }
 
     /// Genotypes, recomputed if necessary.

@@ -45,7 +45,7 @@ impl StoredLineage {
         let id = address.experiment;
         let Who::Individual(generation, individual) = address.who else {
             return Err(QueryError::NoLineage(format!(
-                "`{address}` is no individual; name one, such as {id}@0/0"
+                "`{address}` is not an individual; name one, such as {id}@0/0"
             )));
         };
         let experiment = experiment(store, id)?;

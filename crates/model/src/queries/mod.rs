@@ -69,7 +69,7 @@ pub enum QueryError {
     /// The fitness log differs from the stored one.
     #[error(
         "the fitness log of experiment {experiment} is damaged near generation {generation}; \
-         `swarmctl doctor --data-dir DIR` says what of it is sound"
+         `swarmctl doctor --data-dir DIR` finds its sound parts"
     )]
     DamagedLog {
         /// The experiment.

@@ -82,8 +82,8 @@ pub enum StoreError {
     },
     /// The database's content is invalid.
     #[error(
-        "the database is damaged: {0}; restore it from a copy, or let \
-         `swarmctl doctor --data-dir DIR` say what of it is sound"
+        "the database is damaged: {0}; restore it from a copy, or let `swarmctl doctor \
+         --data-dir DIR` find its sound parts"
     )]
     Corrupt(String),
     /// The database is a copy of one in use, and lacks the data outside the copied file.
@@ -114,8 +114,9 @@ pub enum StoreError {
     },
     /// An ended experiment is sound, but has no state from which it could continue.
     #[error(
-        "experiment {0} has ended, and nothing is left that it could go on from: its fitness log was \
-         damaged, or an older version kept none; submit its file again to have it computed anew"
+        "experiment {0} has ended, and no state is left from which it could continue: its \
+         fitness log was damaged, or an older version kept none; submit its file again to \
+         recompute it"
     )]
     NoCheckpoint(ExperimentId),
     /// There is no database to inspect or copy.
@@ -154,7 +155,9 @@ pub enum StoreError {
     #[error("experiment {0} has ended")]
     Ended(ExperimentId),
     /// The experiment has not ended, and needs its fitness log to continue.
-    #[error("experiment {0} has not ended, and goes on from its fitness log; prune it afterwards")]
+    #[error(
+        "experiment {0} has not ended, and needs its fitness log to continue; prune it after its end"
+    )]
     Unfinished(ExperimentId),
     /// Forks of the experiment share generations with it that are stored nowhere else.
     #[error(

@@ -285,7 +285,7 @@ fn what_goes_wrong_says_where_why_and_for_whom() {
         ("robot.world.robots[1].left = 1", "for robot 0"),
         ("robot.sense('light')", "have no reading `light`; did you mean `light_sensor`?"),
         ("robot.sense(1)", "`sense` takes the name of a reading"),
-        ("return 1", "returns a int; a robot acts by what is assigned"),
+        ("return 1", "returns a int; assign a robot's actions instead"),
         ("robot.world.lights[0].random()", "draws for itself in `control`, `move` or `sense` only"),
         ("[0 for i in range(999) for j in range(999) if False]", "does too much"),
     ] {

@@ -19,7 +19,7 @@ const AXLE_MIN: f64 = 0.5;
 const AXLE_MAX: f64 = 50.0;
 /// Angles of a light's orbit that are more than a jump in a step.
 const ORBIT_MAX: f64 = 0.5;
-/// What decays like this per cm is gone where the next robot is.
+/// Largest plausible decay per cm: with more, nothing reaches the next robot.
 const DECAY_MAX: f64 = 2.0;
 /// Robots nearer than this are on top of each other, cm.
 const APART: f64 = 1.0;

@@ -22,7 +22,7 @@ pub struct Source {
     pub version: i64,
     /// `None` if the database has no seals, or has lost their key; then only digests are checked.
     pub sealer: Option<Sealer>,
-    /// What is wrong with the database as a whole.
+    /// The damage of the database as a whole.
     pub damage: Vec<String>,
 }
 

@@ -52,7 +52,7 @@ pub(crate) struct WiredBlock<const N: usize> {
 pub(crate) struct WiredCoupling<const N: usize> {
     /// Row of the presynaptic neuron or input.
     pub pre: usize,
-    /// Of each neuron: its synapses in `WiredBlocks::synapses`.
+    /// The range of each neuron's synapses in `WiredBlocks::synapses`.
     synapses: [Range<usize>; N],
 }
 

@@ -44,7 +44,7 @@ pub(super) struct Chunk {
     memory: Option<Memory>,
     /// Spikes in the environment step, `[neuron, then node][lane]`.
     counts: Aligned,
-    /// Of motor neurons: the substep of the first spike, x and a of the filter,
+    /// Variables of motor neurons: the substep of the first spike, and x and a of the filter,
     /// `[motor neuron][variable][lane]`.
     motor: Aligned,
 }

@@ -11,8 +11,8 @@ pub(super) type Parameters<'a> = &'a dyn Fn(&str) -> f64;
 /// neuron.
 pub(super) const FLOOR: f32 = -1e6;
 
-/// A model with C constants and Z state variables per neuron, the first of which is the
-/// voltage v, mV.
+/// A model with C constants and Z state variables per neuron; the first variable is the voltage
+/// v, mV.
 pub(super) trait Model<const C: usize, const Z: usize>: fmt::Debug {
     /// The constants of a neuron. `dt`: ms.
     fn constants(parameters: Parameters<'_>, dt: f64) -> [f64; C];
