@@ -73,7 +73,7 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
 
     let elsewhere = CoordinatorProcess::start();
     let import = |path: &Path| elsewhere.swarmctl(&["import", path.to_str().unwrap()]);
-    refused(&import(&fork), 3, "import that first");
+    refused(&import(&fork), 3, "import the parent first");
     let imported = import(&file).expect_success().json();
     assert_eq!(import(&file).expect_success().json(), imported, "it is there already");
     import(&fork).expect_success();
