@@ -25,7 +25,7 @@ const CONFIG_COPIES: u64 = 4;
 /// Bytes of everything else in an experiment.
 const BYTES_PER_EXPERIMENT: u64 = 64 << 10;
 
-/// An estimate of the most bytes that an experiment takes. An experiment of another release,
+/// Estimated upper bound of an experiment's memory, bytes. An experiment of another release,
 /// which does not run, may count as nearly nothing.
 pub fn estimate(summary: &Summary, genotype_len: u64) -> u64 {
     let algorithm = summary;

@@ -99,8 +99,7 @@ const HANDSHAKE: [&str; 5] = [
     "field swarm.v1.Hello.sim_core_fingerprint ",
 ];
 
-/// The version that a `worker.proto` describes; none for those from before the version was in the
-/// file.
+/// The version that a `worker.proto` describes; `None` for files from before it had one.
 fn worker_version(set: &FileDescriptorSet) -> Option<i32> {
     let mut enums = set.file.iter().flat_map(|file| &file.enum_type);
     let version = enums.find(|enumeration| enumeration.name() == "ProtocolVersion")?;

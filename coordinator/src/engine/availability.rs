@@ -35,7 +35,7 @@ pub struct Obstacles {
     pub quarantined: Option<String>,
     /// Whether it is stalled.
     pub is_stalled: bool,
-    /// The open question about a result of it.
+    /// The open question about one of its results.
     pub question: Option<QuestionId>,
     /// Until when it rests.
     pub resting_until: Option<Instant>,

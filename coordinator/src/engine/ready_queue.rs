@@ -46,8 +46,8 @@ impl ReadyQueue {
         }
     }
 
-    /// Moves a job that waited for a suitable worker to the present virtual time, so that it has
-    /// saved up none.
+    /// Moves a job that waited for a suitable worker to the present virtual time, so that the
+    /// wait gives it no advantage.
     pub fn renew(&mut self, id: JobId, work: &mut JobWork) {
         self.ready.remove(&(work.virtual_time, id));
         self.update(id, work);

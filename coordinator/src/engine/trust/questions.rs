@@ -19,8 +19,8 @@ use crate::{
 
 use super::super::{Command, OpenQuestion, batch::name_of, item::Item, known_results::same_bits};
 
-/// Number of processes that an item must take down before it is to blame: something else may kill
-/// one, such as a system that is short of memory.
+/// Number of processes that an item must take down before it is to blame. A single death may have
+/// another cause, such as a system that is short of memory.
 const N_DEATHS: u32 = 3;
 /// Time between these attempts, by which other causes have passed.
 const DEATH_DELAY: Duration = Duration::from_secs(5);
