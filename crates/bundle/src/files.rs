@@ -1,8 +1,7 @@
 //! The files of a bundle: writes the content of each as bytes, and reads it back.
 
-use evolution::{Champion, ChampionSource, Digest, Real, Statistics};
+use evolution::{Champion, ChampionSource};
 use experiment_file::limits;
-use serde::{Deserialize, Serialize};
 
 use super::{
     Bundle, BundleError, GenerationRow, Manifest,
@@ -46,23 +45,6 @@ pub fn all() -> [File; 6] {
 
 /// Largest length of a line of `history.csv`, bytes; usual ones have 200.
 const LINE_LEN_MAX: usize = 1 << 10;
-
-/// A row of `history.csv`.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Row {
-    generation: u64,
-    best: Real,
-    mean: Real,
-    min: Real,
-    standard_deviation: Real,
-    episodes: u64,
-    duration_ms: u64,
-    completed_at_ms: u64,
-    workers: u64,
-    idle_share: f64,
-    digest: Digest,
-}
 
 impl Bundle {
     /// The files except the description.
@@ -152,21 +134,7 @@ fn write_manifest(manifest: &Manifest) -> Vec<u8> {
 
 fn write_history(history: &[GenerationRow]) -> Vec<u8> {
     let mut table = csv::Writer::from_writer(Vec::new());
-    for (generation, row) in (0..).zip(history) {
-        let GenerationRow { statistics, digest, .. } = row;
-        let row = Row {
-            generation,
-            best: statistics.best,
-            mean: statistics.mean,
-            min: statistics.min,
-            standard_deviation: statistics.standard_deviation,
-            episodes: row.episodes,
-            duration_ms: row.duration_ms,
-            completed_at_ms: row.completed_at_ms,
-            workers: row.workers,
-            idle_share: row.idle_share,
-            digest: *digest,
-        };
+    for row in history {
         table.serialize(row).expect("numbers and text are a row");
     }
     table.into_inner().expect("memory can be written")
@@ -181,23 +149,14 @@ fn read_history(bytes: &[u8], n_max: u64) -> Result<Vec<GenerationRow>, String> 
     }
     let mut history = Vec::new();
     for (generation, row) in (0..).zip(csv::Reader::from_reader(bytes).into_deserialize()) {
-        let row: Row = row.map_err(|error| error.to_string())?;
+        let row: GenerationRow = row.map_err(|error| error.to_string())?;
         if generation >= n_max {
             return Err(too_many(n_max));
         }
         if row.generation != generation {
             return Err(format!("generation {generation} is not where it belongs"));
         }
-        let Row { best, mean, min, standard_deviation, .. } = row;
-        history.push(GenerationRow {
-            statistics: Statistics { best, mean, min, standard_deviation },
-            episodes: row.episodes,
-            duration_ms: row.duration_ms,
-            completed_at_ms: row.completed_at_ms,
-            workers: row.workers,
-            idle_share: row.idle_share,
-            digest: row.digest,
-        });
+        history.push(row);
     }
     Ok(history)
 }
@@ -263,6 +222,8 @@ fn too_many(n_max: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use evolution::{Digest, Statistics};
+
     use super::*;
 
     /// Frames of these lengths.
@@ -316,18 +277,22 @@ mod tests {
 
     #[test]
     fn a_history_has_as_many_rows_as_generations_may_be_each_in_its_place() {
-        let digest = Digest::default();
-        let statistics = Statistics::from_fitness(&[1.0, 0.0]);
+        let Statistics { best, mean, min, standard_deviation } =
+            Statistics::from_fitness(&[1.0, 0.0]);
         let row = GenerationRow {
-            statistics,
+            generation: 0,
+            best,
+            mean,
+            min,
+            standard_deviation,
             episodes: 1,
             duration_ms: 1,
             completed_at_ms: 1,
             workers: 1,
             idle_share: 0.0,
-            digest,
+            digest: Digest::default(),
         };
-        let two = write_history(&[row.clone(), row]);
+        let two = write_history(&[row.clone(), GenerationRow { generation: 1, ..row }]);
         assert_eq!(read_history(&two, 2).unwrap().len(), 2);
         assert_eq!(read_history(&two, 1).unwrap_err(), too_many(1));
         let twice = String::from_utf8(two).unwrap().replace("\n1,", "\n0,");

@@ -16,7 +16,7 @@ mod verification;
 
 use std::fmt;
 
-use evolution::{Digest, Statistics};
+use evolution::{Digest, Real, Statistics};
 use serde::{Deserialize, Serialize};
 
 pub use archive::{LEN_MAX, UNPACKED_LEN_MAX};
@@ -81,11 +81,20 @@ pub struct ForkOf {
     pub changes: Vec<String>,
 }
 
-/// A row of the history.
-#[derive(Debug, Clone, PartialEq)]
+/// A row of the history, with the columns of `history.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GenerationRow {
-    /// Statistics of the individuals' mean fitness.
-    pub statistics: Statistics,
+    /// From 0: its place in the history.
+    pub generation: u64,
+    /// Largest of the individuals' mean fitness.
+    pub best: Real,
+    /// Mean of the individuals' mean fitness.
+    pub mean: Real,
+    /// Smallest of the individuals' mean fitness.
+    pub min: Real,
+    /// Population standard deviation of the individuals' mean fitness.
+    pub standard_deviation: Real,
     /// Number of simulated episodes.
     pub episodes: u64,
     /// Wall-clock time, ms.
@@ -98,6 +107,14 @@ pub struct GenerationRow {
     pub idle_share: f64,
     /// Link of the digest chain.
     pub digest: Digest,
+}
+
+impl GenerationRow {
+    /// Statistics of the individuals' mean fitness.
+    pub fn statistics(&self) -> Statistics {
+        let &Self { best, mean, min, standard_deviation, .. } = self;
+        Statistics { best, mean, min, standard_deviation }
+    }
 }
 
 /// Version of the format that this code reads and writes.

@@ -77,8 +77,13 @@ fn evolved(
         }
         log.push(told.to_bytes());
         keyframes.push((evolution.n_generations(), evolution.keyframe()));
+        let Statistics { best, mean, min, standard_deviation } = summary.statistics;
         history.push(GenerationRow {
-            statistics: summary.statistics,
+            generation,
+            best,
+            mean,
+            min,
+            standard_deviation,
             episodes: told.trial_fitness.iter().map(|trials| trials.len() as u64).sum(),
             duration_ms: 7,
             completed_at_ms: 1_700_000_000_000 + generation,

@@ -13,7 +13,7 @@ use evolution::{
 use experiment_file::ExperimentConfig;
 use sim_core::{FINGERPRINT, Simulation, TrialSet, panic_to_failure};
 
-use super::{Bundle, GenerationRow, Sample, champion_json};
+use super::{Bundle, Sample, champion_json};
 
 /// A verification in progress.
 #[derive(Debug)]
@@ -231,8 +231,7 @@ impl<'a> Verification<'a> {
             return Err(Claim::Chain.flaw(at(&what)));
         }
         let n_episodes: u64 = told.trial_fitness.iter().map(|trials| trials.len() as u64).sum();
-        let GenerationRow { statistics, .. } = row;
-        let [found, stated] = [summary.statistics, *statistics]
+        let [found, stated] = [summary.statistics, row.statistics()]
             // Databases do not keep the sign of zero.
             .map(|statistics| {
                 [statistics.best, statistics.mean, statistics.min, statistics.standard_deviation]

@@ -1,12 +1,12 @@
 //! Packs an ended experiment as a bundle.
 
 use bundle::{Bundle, FORMAT, ForkOf, GenerationRow, Manifest, champion_json};
-use evolution::{Digest, End, Told};
+use evolution::{Digest, End, Statistics, Told};
 use swarm_telemetry::VERSION;
 
 use crate::{
     ids::ExperimentId,
-    store::{Evidence, ExperimentRecord, ForkRecord, GenerationRecord, Store, StoredExperiment},
+    store::{Evidence, ExperimentRecord, ForkRecord, Store, StoredExperiment},
 };
 
 use super::{QueryError, experiment, generation::Gap};
@@ -38,16 +38,19 @@ pub fn bundle(store: &Store, id: ExperimentId) -> Result<Bundle, QueryError> {
         Ok(Told { end, ..told }.to_bytes())
     });
     let history = history.into_iter().map(|(completed_at_ms, row)| {
-        let GenerationRecord { statistics, duration_ms, episodes, workers, idle_share, .. } = row;
-        let digest = digest(&row.digest)?;
+        let Statistics { best, mean, min, standard_deviation } = row.statistics;
         Ok(GenerationRow {
-            statistics,
-            episodes,
-            duration_ms,
+            generation: row.generation,
+            best,
+            mean,
+            min,
+            standard_deviation,
+            episodes: row.episodes,
+            duration_ms: row.duration_ms,
             completed_at_ms,
-            workers,
-            idle_share,
-            digest,
+            workers: row.workers,
+            idle_share: row.idle_share,
+            digest: digest(&row.digest)?,
         })
     });
     let fork = experiment.fork.map(|ForkRecord { generation, link, changes, .. }| {

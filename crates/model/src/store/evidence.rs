@@ -136,8 +136,7 @@ fn put_evidence(
         forks::put(transaction, sealer, id, fork)?;
         fitness_log::begin_at(transaction, id, first, LogGap::Forked)?;
     }
-    let history: Vec<GenerationRecord> =
-        (0..).zip(&bundle.history).map(|(generation, row)| record(generation, row)).collect();
+    let history: Vec<GenerationRecord> = bundle.history.iter().map(Into::into).collect();
     for row in &history {
         history::put(transaction, sealer, id, row)?;
     }
@@ -172,7 +171,8 @@ fn put_events(
         "INSERT INTO events (experiment_id, sequence, at_ms, kind, generation)
          VALUES (?1, ?2, ?3, 'generation', ?4)",
     )?;
-    for (generation, row) in (0u64..).zip(&bundle.history) {
+    for row in &bundle.history {
+        let generation = row.generation;
         statement.execute(params![id.0, generation + 2, row.completed_at_ms, generation])?;
     }
     let ended = bundle.history.last().map_or(submitted, |latest| latest.completed_at_ms);
@@ -181,14 +181,16 @@ fn put_events(
     Ok(())
 }
 
-fn record(generation: u64, row: &bundle::GenerationRow) -> GenerationRecord {
-    GenerationRecord {
-        generation,
-        statistics: row.statistics,
-        digest: row.digest.to_string(),
-        duration_ms: row.duration_ms,
-        episodes: row.episodes,
-        workers: row.workers,
-        idle_share: row.idle_share,
+impl From<&bundle::GenerationRow> for GenerationRecord {
+    fn from(row: &bundle::GenerationRow) -> Self {
+        Self {
+            generation: row.generation,
+            statistics: row.statistics(),
+            digest: row.digest.to_string(),
+            duration_ms: row.duration_ms,
+            episodes: row.episodes,
+            workers: row.workers,
+            idle_share: row.idle_share,
+        }
     }
 }
