@@ -26,7 +26,7 @@ pub struct Worker {
 
 #[pymethods]
 impl Worker {
-    /// Starts it. `slots`: items at the same time, each on a thread of its own.
+    /// Starts it. `slots`: number of simultaneous items, each on its own thread.
     #[new]
     fn new(
         coordinator: &str,

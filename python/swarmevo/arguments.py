@@ -34,7 +34,7 @@ def whole(value: Any, name: str, least: int = 0, most: int = U64_MAX) -> int:
     if not isinstance(value, (bool, np.bool_)):
         try:
             found = operator.index(value)
-        # Arrays of other libraries have errors of their own.
+        # Arrays of other libraries have their own errors.
         except Exception:
             pass
     if found is None or not least <= found <= most:

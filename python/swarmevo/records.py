@@ -80,7 +80,7 @@ class Records(ABC):
         if not isinstance(address, str):
             address = str(arguments.whole(address, "an address is a text such as 3@5/7, or a number: it", 1))
         if "@" in address and "/" not in address:
-            raise ValueError(f"`{address}` is a generation; name one of it, such as {address}/0")
+            raise ValueError(f"`{address}` is a generation; name one individual, such as {address}/0")
         found = self._call("GetIndividuals", address=address).individuals
         number = address.partition("@")[0]
         of = self._call("GetExperiment", experiment_id=int(number)).experiment

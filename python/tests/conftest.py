@@ -1,4 +1,4 @@
-"""What tests share."""
+"""Shared fixtures of tests."""
 
 import os
 from pathlib import Path

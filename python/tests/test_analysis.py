@@ -1,4 +1,4 @@
-"""Analysis: known answers come out of planted protocols and of known networks."""
+"""Analysis: planted protocols and known networks give known answers."""
 
 import csv
 import json
@@ -16,7 +16,8 @@ T, STEPS, R = 30, 60, 8
 
 
 def planted(symbols, sends=None, heard=None):
-    """What the measures look at, of a swarm that says `symbols` [T, STEPS, R]."""
+    """The trace, reduced to what the measures read, of a swarm that sends `symbols` [T, STEPS,
+    R]."""
     shape = symbols.shape
     heard = np.full(shape, -1) if heard is None else heard
     return SimpleNamespace(
@@ -45,7 +46,7 @@ def test_a_symbol_that_copies_a_stimulus_tells_as_much_as_it_can(rng, p):
     copies = rng.random(stimulus.shape) < p
     said = np.where(copies, stimulus, rng.integers(0, 2, stimulus.shape))
     found = analysis.signalling(planted(said), stimulus)
-    # It equals the stimulus with probability p + (1 - p) / 2.
+    # The symbol equals the stimulus with probability p + (1 - p) / 2.
     expected = 1 - binary_entropy(p + (1 - p) / 2)
     assert found.excess == pytest.approx(expected, abs=0.01)
     assert (found.p < 0.01) == (p > 0)
@@ -166,8 +167,8 @@ def test_a_genotypes_network_alone_does_what_it_did_in_the_swarm(quickstart, gen
 def test_a_report_says_which_inputs_matter_and_is_the_same_file_twice(quickstart, genotypes, tmp_path):
     path = analysis.report(quickstart, genotypes[0], tmp_path / "once", trials=2)
     page = path.read_text()
-    headings = ("How it does it", "Which inputs matter", "Under other conditions", "What is said", "Who informs whom")
-    for heading in (*headings, "What each part of the network is worth", "The network alone"):
+    headings = ("How it solves the task", "Which inputs matter", "Under other conditions", "Messages", "Flow of messages")
+    for heading in (*headings, "Worth of each part of the network", "The network alone"):
         assert heading in page
     assert "http://" not in page.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
         "http://creativecommons.org", ""

@@ -26,7 +26,7 @@ def episodes(name):
 
 
 def within(flags, window):
-    """In how many of the last `window` steps, this one included: [T, steps, R]."""
+    """The number of true values in the last `window` steps, this one included: [T, steps, R]."""
     sums = np.cumsum(flags, axis=1)
     before = np.zeros_like(sums)
     before[:, window:] = sums[:, :-window]
@@ -34,7 +34,7 @@ def within(flags, window):
 
 
 def said_of(name):
-    """What a report says of where the network settles."""
+    """The statements of a report on the states where the network settles."""
     of = champion(name)
     found = analysis.settled(of.experiment, of.genotype, episodes(name))
     return _settling(SimpleNamespace(experiment=of.experiment, settled=found))
@@ -49,7 +49,7 @@ def test_reports_say_where_networks_settle():
 
 
 class TestLeaderSelection:
-    """A: who hears nothing leads."""
+    """A: a robot that hears nothing leads."""
 
     def test_who_has_heard_nothing_for_ten_steps_has_its_led_on_and_who_has_heard_something_in_each_has_not(self):
         trace = episodes("leader_selection")
@@ -96,7 +96,7 @@ class TestLeaderSelection:
 
 
 class TestBorderline:
-    """B: who hears from opposite sides is inside."""
+    """B: a robot that hears from opposite sides is inside."""
 
     def test_alone_the_network_is_off_only_if_it_hears_from_opposite_sides_and_no_third(self):
         b = champion("borderline")
@@ -130,7 +130,7 @@ class TestBorderline:
 
 
 class TestOrientationConsensus:
-    """C: turn until the sector in which you are heard is opposite to that in which you hear."""
+    """C: a robot turns until it hears in the sector opposite to the one in which it is heard."""
 
     def test_aligned_robots_rest_and_others_turn_to_the_side_that_aligns(self):
         trace = episodes("orientation_consensus")
@@ -148,7 +148,7 @@ class TestOrientationConsensus:
 
 
 class TestLightFollower:
-    """D: turn to what is heard, stop for what is behind, circle the light."""
+    """D: turn to heard robots, stop for those behind, circle the light."""
 
     def test_in_the_dark_it_drives_to_what_it_hears_in_front_turns_to_the_sides_and_stops_for_what_is_behind(self):
         trace = episodes("light_follower")

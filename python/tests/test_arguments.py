@@ -1,4 +1,4 @@
-"""Every number that the package takes is a whole number, or refused by name."""
+"""The package accepts only whole numbers where it needs them, and names refused arguments."""
 
 import inspect
 import re
@@ -18,7 +18,7 @@ LIT = TRACE.leds[:, 10:] > 0
 
 
 class Nobody:
-    """What a coordinator or a database would be, if anybody got so far."""
+    """Stands for a coordinator or a database, which no test may reach."""
 
     def __init__(self):
         self.client = object.__new__(swarmevo.Client)
@@ -34,7 +34,7 @@ class Nobody:
 
 
 class Reached(Exception):
-    """Whatever was given has passed all checks."""
+    """The arguments have passed all checks."""
 
 
 HERE = Nobody()
@@ -177,12 +177,13 @@ def test_whole_numbers_of_other_libraries_are_whole_numbers(name):
 
 
 def test_no_number_is_forgotten():
-    """All that is annotated as a whole number is in the table."""
+    """The table contains every argument that is annotated as a whole number."""
     named = {f"{owner}.{key}".removeprefix("swarmevo.") for owner, key in numbers()}
     inherited = {f"{it.__name__}.{name}" for it in (swarmevo.GA, swarmevo.SNES, swarmevo.XNES, swarmevo.CMAES,
                                                       swarmevo.SepCMAES, swarmevo.OpenAIES) for name in ("compare", "judge")}
     left = {it for it in named - CASES.keys() if it.rpartition(".")[0] not in inherited}
-    # Results, which nobody but the package makes; what their classes inherit; and what is tried as another's.
+    # Leaves out results, which only the package makes; inherited members; and members that are
+    # tested under another name.
     made = {"ExperimentError", "Champion", "Generation", "Judged", "Selection", "Origin", "Problem", "Replay", "Workers", "Client", "Interrupted", "LocalRun"}
     left = {it for it in left if it.split(".")[0] not in made or it.count(".") > 1}
     assert left <= {"Evolution.n_genes", "Evolution.population_size", "Evolution.seed", "RecordedRun.experiment_id",

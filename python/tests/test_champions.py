@@ -1,4 +1,4 @@
-"""A champion meets the experiment that it was evolved in, or says so."""
+"""A champion is accepted only by the experiment in which it evolved."""
 
 import json
 import pickle
@@ -28,7 +28,8 @@ def champion(tiny):
 
 @pytest.fixture(scope="module")
 def others(tiny):
-    """With as many genes: another world, another seed, another number of trials, another network."""
+    """Experiments with as many genes: another world, another seed, another number of trials, another
+    network."""
     config = tiny.to_dict()
     config["world"]["width"] = 900
     longer = tiny.to_dict()

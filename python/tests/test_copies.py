@@ -1,4 +1,4 @@
-"""Copies, pickles and forked processes go on to the same bits, or say at once that they cannot."""
+"""Copies, pickles and forked processes continue to the same bits, or fail at once."""
 
 import copy
 import multiprocessing
@@ -11,13 +11,13 @@ import pytest
 import swarmevo
 
 SECONDS = 60
-"""After which a process that does not answer hangs."""
+"""Time after which a silent process counts as hanging."""
 WAYS = {"pickle": lambda it: pickle.loads(pickle.dumps(it)), "deepcopy": copy.deepcopy, "copy": copy.copy}
 STARTS = [it for it in ("fork", "spawn") if it in multiprocessing.get_all_start_methods()]
 
 
 def begun(experiment, n_steps):
-    """Episodes in which everything that can be done has been done."""
+    """Episodes after every kind of call."""
     rng = np.random.default_rng(n_steps)
     episodes = experiment.episodes(3, trials=range(2, 4))
     shape = (2, len(episodes.agents))
@@ -39,7 +39,7 @@ def begun(experiment, n_steps):
 
 
 def rest(episodes):
-    """All bits of what remains."""
+    """All bits of the remaining steps."""
     bits = [episodes.stimuli.tobytes(), episodes.sent.tobytes()]
     while not episodes.is_over:
         actions = episodes.decide()
@@ -53,7 +53,7 @@ def send_rest(pipe, episodes):
 
 
 def in_process(start, call, *arguments):
-    """What `call` sends from a process."""
+    """The result of `call` in another process."""
     context = multiprocessing.get_context(start)
     ours, theirs = context.Pipe()
     process = context.Process(target=call, args=(theirs, *arguments))

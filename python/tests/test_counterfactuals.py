@@ -1,4 +1,4 @@
-"""Counterfactuals: what one message, or one thing that was sensed, has caused."""
+"""Counterfactuals: the effects of one message or one reading."""
 
 import json
 
@@ -44,7 +44,7 @@ def course(leader, silent=False):
 
 
 def same(one, other):
-    """Whether two answers are, but for who was asked about."""
+    """Whether two answers are equal, except for the agents in question."""
     return all(np.array_equal(mine, its) for name, mine in vars(one).items() for its in [vars(other)[name]])
 
 
@@ -152,7 +152,8 @@ def test_stimuli_that_do_not_fit_are_refused_and_those_that_are_set_are_sensed(q
 def test_frozen_is_what_it_was_in_the_step_before_and_permuted_is_what_the_next_robot_has(leader):
     actions, stimuli = course(leader)
     episode = {"agents": [3], "trials": 1, "lasting": 1}
-    # A step in which robot 3 sends, and neither it nor robot 4 says or senses what it did or does.
+    # A step in which robot 3 sends, and the messages and readings of robots 3 and 4 differ from
+    # each other and from the previous step.
     step = next(
         k for k in range(1, 290)
         if actions[k].sends[0, 3]

@@ -14,11 +14,11 @@ import swarmevo
 PAGE = (PROJECT / "docs/python.md").read_text()
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 FLEET = ("swarmevo.connect()",)
-"""What needs a coordinator."""
+"""The examples that need a coordinator."""
 
 
 class SmallCluster:
-    """A Dask client would be as good."""
+    """A substitute for a Dask client."""
 
     def __init__(self):
         from concurrent.futures import ThreadPoolExecutor
@@ -31,7 +31,7 @@ class SmallCluster:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The project's folder, as far as examples read it."""
+    """The part of the project's folder that examples read."""
     folder = tmp_path_factory.mktemp("project")
     for name in ("configs", "results"):
         (folder / name).symlink_to(PROJECT / name)
@@ -39,7 +39,7 @@ def folder(tmp_path_factory):
 
 
 def run(blocks, folder, names):
-    """Executes blocks one after the other, with the numbers of generations and nodes that a test has time for."""
+    """Executes blocks one after the other, with numbers of generations and nodes that fit a test."""
     matplotlib.use("Agg")
     before = os.getcwd()
     os.chdir(folder)

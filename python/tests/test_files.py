@@ -20,7 +20,7 @@ def experiment(quickstart):
 
 @pytest.fixture(scope="module")
 def directory(programs, experiment, tmp_path_factory):
-    """What ``swarmctl run`` has left of a run of four generations."""
+    """The data directory of ``swarmctl run`` after four generations."""
     folder = tmp_path_factory.mktemp("run")
     (folder / "file.json").write_text(experiment.to_json())
     subprocess.run(

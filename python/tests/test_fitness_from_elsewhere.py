@@ -1,4 +1,4 @@
-"""Fitness that a function of the user's computes: any array that fits, and nothing else."""
+"""Fitness from a function of the user: accepts any array of the right shape, and nothing else."""
 
 import inspect
 

@@ -1,4 +1,4 @@
-"""Evolution that learns nothing is no secret, and ends as a coordinator's run does."""
+"""Evolution that learns nothing warns, and ends like a coordinator's run."""
 
 import pickle
 import sqlite3
@@ -24,7 +24,8 @@ def every_warning_counts():
 
 @pytest.fixture(scope="module")
 def still():
-    """Its script gives everybody the same fitness, and chance soon drives its distribution out of all bounds."""
+    """Its script gives all individuals the same fitness, and chance soon drives its distribution out of all
+    bounds."""
     config = swarmevo.Experiment.from_file(CONFIGS / "tasks" / "scent.json").to_dict()
     config["task"]["script"] = {"name": "still.star", "text": "def sense(robot):\n    return [0.5, 0.5]\n\ndef fitness(world):\n    return 0.25\n"}
     config["topology"]["ensembles"]["H"]["n"] = 1

@@ -119,7 +119,7 @@ def test_waiting_for_workers_that_are_not_there_is_a_warning(programs, tmp_path,
         warnings.showwarning = show
         ASKING[ask](client, short, genotypes)
         assert seen == [(swarmevo.FleetWarning, __file__)]
-        # Now there is one.
+        # Now a worker is connected.
         client.evaluate(short, genotypes, trials=50)
         client.submit(short, seed=7).wait(progress=False)
         assert len(seen) == 1
@@ -157,7 +157,7 @@ def test_large_populations_travel_in_parts(client, quickstart, genotypes, monkey
 
 
 def test_anybodys_optimiser_drives_the_fleet(client, short, here):
-    """The run of a coordinator's own evolution, driven from here."""
+    """Drives an evolution from here, with the same results as a coordinator's run."""
     run = swarmevo.evolve(
         short, progress=False,
         evaluate=lambda genotypes, trial_set, n: client.evaluate(short, genotypes, trial_set, trials=n),
@@ -226,7 +226,7 @@ def test_settings_are_found_as_swarmctl_finds_them(tmp_path, monkeypatch):
     monkeypatch.setenv("SWARM_CONFIG", str(file))
     found = Settings.find(Settings())
     assert found.address == "http://file:1" and found.token_file == str(tmp_path / "secret")
-    # A token is for its coordinator only.
+    # A token must reach its own coordinator only.
     other = Settings.find(Settings(coordinator="http://other:1"))
     assert other.address == "http://other:1" and other.token_file is None
     monkeypatch.setenv("SWARM_COORDINATOR", "http://variable:1")

@@ -1,4 +1,4 @@
-"""Fitness under other conditions: which there are, and what each of them changes."""
+"""Fitness under other conditions: the list of conditions, and the change of each."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def test_a_world_that_grows_with_its_swarm_keeps_its_density_and_one_that_does_n
     assert world["width"] * world["height"] / 30 == pytest.approx(1000 * 1000 / 10)
     assert world["objects"]["light_red"]["initializers"]["positions"]["params"]["values"] == [[pytest.approx(500 * 3**0.5)] * 2]
     ten = neighbours(swarmevo.Experiment.from_file(PROJECT / "configs/light_follower_snes.json"))
-    # Fewer robots are at the swarm's border, that is all.
+    # Only the share of robots at the swarm's border differs.
     assert ten < neighbours(as_dense) < 1.6 * ten
     assert neighbours(crowded) > 3 * ten
 

@@ -1,4 +1,4 @@
-"""Networks taken apart: equilibria that are followed, parts that are taken away, states."""
+"""Analysis of networks: continuation of equilibria, lesions, states."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_beers_circuit_has_a_hopf_point_where_the_trace_of_its_jacobian_is_zero(
         assert np.trace(jacobian) == pytest.approx(0, abs=1e-8)
         assert np.linalg.det(jacobian) > 0
         assert it.period == pytest.approx(2 * np.pi / np.sqrt(np.linalg.det(jacobian)), rel=1e-6)
-        # On one side of it the state comes to rest, on the other it goes round in about that period.
+        # On one side of it the state comes to rest, on the other it cycles with about that period.
         at = -3 + 6 * it.share
         inwards = 0.02 * np.sign(-at)
         rest = OSCILLATOR.attractor([at - 5 * inwards, 0])
@@ -129,10 +129,10 @@ def test_lesions_are_ranked_by_what_they_cost_and_those_without_effect_say_so(qu
     network = quickstart.network(genotypes[0])
     changes = [it.change for it in found]
     assert changes == sorted(changes)
-    # What no synapse leaves, nobody can miss.
+    # A neuron without outgoing synapses has no effect.
     sources = {network.neurons[i] for i in np.flatnonzero((network.weights != 0).any(axis=0))}
     assert {it.part for it in found} == sources
-    # Taking away what is zero already changes not a bit.
+    # Removing a zero weight does not change a bit.
     where, zero = analysis.synapse_genes(quickstart)
     silent = genotypes[0].copy()
     of = [i for i, it in enumerate(network.description["synapses"]) if it["pre"] == {"neuron": 3}]

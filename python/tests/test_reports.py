@@ -1,4 +1,4 @@
-"""Reports, as the one command writes them: of a champion file, of an address, with a fleet."""
+"""Reports of the command: on a champion file, on an address, with a fleet."""
 
 import json
 import re
@@ -27,7 +27,7 @@ def champion_file(champion):
 
 
 def command(*arguments, **environment):
-    """What `python -m swarmevo.analysis` does, in a folder without settings."""
+    """Runs `python -m swarmevo.analysis` in a folder without settings."""
     return subprocess.run(
         [sys.executable, "-m", "swarmevo.analysis", *map(str, arguments)],
         capture_output=True, text=True, timeout=300, env={"PATH": "/usr/bin:/bin", **environment},

@@ -1,4 +1,4 @@
-"""Whole runs here: kept, interrupted, gone on with, told of."""
+"""Whole runs in this process: storage, interrupts, continuation, callbacks."""
 
 import json
 import os
@@ -18,7 +18,8 @@ GENERATIONS = 7
 
 @pytest.fixture(scope="module")
 def short(quickstart):
-    """Seven generations, with comparisons after the third and the sixth, and one that is only the end's."""
+    """Seven generations, with comparisons after the third and the sixth, and one that only the end
+    causes."""
     return quickstart.replace(
         generations=GENERATIONS, champion_every=3, champion_trials=4, judgement_trials=9, evaluation_steps=30
     )
@@ -30,7 +31,7 @@ def whole(short):
 
 
 def stop_after(n):
-    """A callback that is Ctrl-C after so many generations."""
+    """A callback that raises Ctrl-C after a number of generations."""
 
     def callback(generation, evolution):
         assert evolution.n_generations == generation.index + 1

@@ -1,4 +1,5 @@
-"""What people see first: names, versions, representations, what is missing, what is new."""
+"""The first contact with the package: names, versions, representations, missing packages,
+deprecations."""
 
 import inspect
 import subprocess
@@ -173,7 +174,7 @@ def test_every_extra_is_known_to_the_one_that_tells():
 
 
 def test_reading_the_fitness_of_many_generations_takes_no_time(tmp_path):
-    """A bound for what took seconds: 300 generations of 60 genotypes, 424 genes."""
+    """A time limit for work that once took seconds: 300 generations of 60 genotypes, 424 genes."""
     experiment = swarmevo.Experiment.quickstart().replace(
         algorithm="SNES", population_size=60, generations=300, evaluation_steps=1, num_evaluations=1, champion_every=300,
         champion_trials=1, judgement_trials=1,

@@ -70,7 +70,7 @@ def test_an_alpha_of_zero_is_the_convex_hull_and_a_larger_one_has_more_points():
     on = [set(analysis.alpha_shape(points, radius)[0].tolist()) for radius in (np.inf, 0.3, 0.1)]
     assert on[0] == set(ConvexHull(points).vertices.tolist())
     assert on[0] < on[1] < on[2]
-    # The outline is closed: as many edges of it end in a point as begin there.
+    # The outline is closed: as many edges end in each point as begin there.
     edges = analysis.alpha_shape(points, 0.3)[1]
     assert (np.bincount(edges.reshape(-1)) % 2 == 0).all()
 

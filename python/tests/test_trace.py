@@ -78,7 +78,7 @@ def test_the_table_is_the_trace_of_swarmctl(quickstart, genotypes, programs, tmp
     columns = quickstart.simulate(genotypes[0], 1).columns()
     assert len(rows) == len(columns["trial"])
     same = set(rows[0]) & set(columns)
-    # Their modes are words, and what there is not is empty.
+    # Their modes are words, and missing values are empty.
     assert set(rows[0]) - same == {"mode"} and set(columns) - same == {"sends"}
     for name in sorted(same - {"object"}):
         for row, value in zip(rows[::7], columns[name][::7]):

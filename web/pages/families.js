@@ -184,7 +184,8 @@ export function familiesPanel(id) {
   });
   new ResizeObserver(draw).observe(stage);
 
-  /** Axes and points as one figure: a path for each kind, whose points are the round ends of lines without length. */
+  /** Axes and points as one figure: one path per kind, with points as round ends of lines without
+   *  length. */
   const whole = () => {
     const points = KINDS.map(({ name, color }) => shape("path", {
       d: shown.filter((it) => it.operator === name).map((it) => `M${scale.x(it.x).toFixed(1)} ${scale.y(it.fitness).toFixed(1)}h0`).join(""),

@@ -60,7 +60,7 @@ export function robotPanel(episode, view, seek, choose, id) {
     }, "led");
     if (episode.kinds[shown].emits_within !== null) {
       fact("sends", () => {
-        if (episode.whole("relays", shown, view.step)) return "what it hears (relays)";
+        if (episode.whole("relays", shown, view.step)) return "the message that it hears (relays)";
         return message(episode.components("message", shown, view.step), shown);
       }, "sends");
     }

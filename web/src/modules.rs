@@ -1,7 +1,7 @@
 //! The files of the folder `pages`, which are part of this program.
 //!
 //! Modules import each other by bare names, `swarm/NAME`, which a page's import map
-//! resolves: to data within a file of its own, to addresses of a server otherwise.
+//! resolves: to data within a single file, or to addresses of a server.
 
 use std::collections::BTreeMap;
 

@@ -35,7 +35,7 @@ pub enum Action {
     Resume,
     /// Ends the experiment.
     Cancel,
-    /// Its weight in the sharing of the fleet, 1 to 1000.
+    /// Its share of the fleet relative to other experiments, 1 to 1000.
     Priority(u32),
     /// Whether it is in the archive.
     Archive(bool),

@@ -115,16 +115,16 @@ def _heeding(found: Findings) -> list[str]:
         moved = share(float((it.reached[it.said] > 0).mean()))
         led = f", and another LED in {share(float((it.leds[it.said] > 0).mean()))}" if has_led else ""
         said.append(
-            f"A single message, replaced by zeros, changes what another robot does within ten steps in {moved} of {it.said.sum()} cases{led}."
+            f"A single message, replaced by zeros, changes the actions of another robot within ten steps in {moved} of {it.said.sum()} cases{led}."
             if it.reached.any()
             else f"None of {it.said.sum()} messages that were replaced by zeros changed the action of any robot."
         )
     for sensor, of in found.attention.items():
         if of.sensed.any():
             heeded = share(float(of.heeded[of.sensed].mean()))
-            led = f"; its LED is otherwise for {of.leds[of.sensed].mean():.2f} of ten steps" if has_led else ""
+            led = f"; its LED differs in {of.leds[of.sensed].mean():.2f} of ten steps" if has_led else ""
             said.append(
-                f"A robot that senses nothing by {sensor} for one step does something otherwise, by a bit, in {heeded} of "
+                f"A robot that senses nothing by {sensor} for one step acts differently, by at least a bit, in {heeded} of "
                 f"{of.sensed.sum()} cases{led}."
             )
     return said
@@ -138,7 +138,7 @@ def _settling(found: Findings) -> list[str]:
     changing = [name for name in (rest[0].outputs if rest else ()) if len({round(it.outputs[name][0], 1) for it in rest}) > 1]
     if rest and not changing:
         alike = _rates(rest[0], [*rest[0].outputs])
-        return [f"Held at any of the {len(rest)} inputs that come most often, the network settles alike, with {alike}."]
+        return [f"Held at any of the {len(rest)} most frequent inputs, the network settles alike, with {alike}."]
     patterns: dict[str, list[Settled]] = {}
     for it in rest:
         patterns.setdefault(_rates(it, changing), []).append(it)
@@ -174,7 +174,7 @@ def _network(found: Findings) -> list[str]:
         said.append(f"The neurons that it misses most are {listed(lost)}: without {first.part} the fitness is {first.fitness:.3f}.")
     idle = [it.part for it in neurons if it.is_same]
     if idle:
-        said.append(f"{len(idle)} of {len(neurons)} neurons tell others nothing that matters: without them, not a bit changes.")
+        said.append(f"{len(idle)} of {len(neurons)} neurons do not influence others: without them, not a bit changes.")
     unused = [it.part for it in groups if it.is_same]
     if unused:
         said.append(f"Of the groups of synapses, {listed(unused)} could be left out.")

@@ -50,7 +50,7 @@ def report(
         f"fitness {mean(trace.fitness)}."
     )
     with style():
-        page.heading("How it does it")
+        page.heading("How it solves the task")
         page.sentences("answer", answer(found))
         _inputs(page, found)
         _conditions(page, found.conditions)
@@ -93,7 +93,7 @@ def _ends(condition: Condition) -> list[object]:
 def _channel(page: Page, found: Findings) -> None:
     use, trace, words = found.use, found.trace, found.spread
     assert use is not None and words is not None
-    page.heading("What is said")
+    page.heading("Messages")
     page.text(
         f"From step {FIRST} on, {100 * use.sends:.1f} % of robots send their own message, the others relay; "
         f"{100 * use.hears:.1f} % hear something. The sent messages have {use.entropy:.2f} bits."
@@ -116,13 +116,13 @@ def _channel(page: Page, found: Findings) -> None:
     page.note("± standard errors over trials.")
     figure, axes = canvas(4.2, 3.6)
     shown = axes.imshow(informants(trace), cmap="Blues", vmin=0)
-    axes.set(xlabel="robot that first sent it", ylabel="robot that hears it", title="Who informs whom")
+    axes.set(xlabel="robot that first sent it", ylabel="robot that hears it", title="Flow of messages")
     figure.colorbar(shown, label="share of heard messages")
     page.figure(figure)
 
 
 def _meaning(page: Page, found: Findings) -> None:
-    page.heading("What it tells, and who heeds it")
+    page.heading("Information of messages, and its use")
     head = ["", "bits", "by chance", "97.5 % of chance below", "p"]
 
     def row(name: str, it: Any) -> list[object]:
@@ -139,7 +139,7 @@ def _meaning(page: Page, found: Findings) -> None:
 
 
 def _counterfactuals(page: Page, found: Findings) -> None:
-    page.heading("What single messages, and single things that were sensed, did")
+    page.heading("Effects of single messages and readings")
     rows: list[list[object]] = []
     it = found.influence
     if it is not None and it.said.any():

@@ -20,7 +20,7 @@ SHOWN = 10
 def network(page: Page, found: Findings) -> None:
     """Lesions, synapses, states in episodes, and, for rate neurons, the isolated network."""
     whole = found.experiment.network(found.genotype)
-    page.heading("What each part of the network is worth")
+    page.heading("Worth of each part of the network")
     for of, lesions in found.lesions.items():
         rows = [
             [it.part, len(it.weights), it.fitness, "the same bits" if it.is_same else f"{it.change:+.3f} ({it.ci95[0]:+.3f} to {it.ci95[1]:+.3f})"]

@@ -44,7 +44,7 @@ pub struct Place {
     /// Bytes from the end of the header.
     offset: usize,
     n_rows: usize,
-    /// What a value of 1 stands for.
+    /// The value of the number 1.
     scale: f64,
     /// Whether steps are differences from the previous step.
     is_difference: bool,

@@ -169,7 +169,7 @@ async fn recent(shared: &Shared, id: u64, done: u64) -> Result<Vec<f32>, Problem
     Ok(summaries.map(|summary| summary.best as f32).collect())
 }
 
-/// The version that a page has.
+/// The version of a page.
 #[derive(Debug, Deserialize)]
 pub struct Since {
     #[serde(default)]
@@ -199,7 +199,7 @@ pub async fn live(
         live::rest(&shared, rest).await?;
         loop {
             news.borrow_and_update();
-            // A database that cannot be read now can be read later.
+            // A failed reading of the database may succeed later.
             if let Ok(changes) = shared.list.since(&shared, &mark).await
                 && !changes.is_empty()
             {

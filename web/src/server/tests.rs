@@ -75,7 +75,7 @@ async fn only_those_who_have_shown_the_token_see_anything() {
     assert_eq!(refused.status(), StatusCode::UNAUTHORIZED);
     let asked = answer(HERE, Some(TOKEN), get("/replay/1?robots=7", HERE, "")).await;
     assert_eq!(asked.status(), StatusCode::UNAUTHORIZED);
-    assert!(text(asked).await.contains("page-login.js"), "the token is not asked for in its place");
+    assert!(text(asked).await.contains("page-login.js"), "the login page does not replace it");
 
     let login = |token: &str| post("/login", HERE, ORIGIN, &format!(r#"{{"token":"{token}"}}"#));
     let wrong = answer(HERE, Some(TOKEN), login(&"x".repeat(32))).await;
@@ -85,7 +85,7 @@ async fn only_those_who_have_shown_the_token_see_anything() {
     assert_eq!(right.status(), StatusCode::NO_CONTENT);
     let cookie = right.headers()["set-cookie"].to_str().unwrap();
     assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
-    assert!(!cookie.contains(TOKEN), "the cookie says what the token is");
+    assert!(!cookie.contains(TOKEN), "the cookie reveals the token");
 
     let cookie = cookie.split(';').next().unwrap();
     let seen = answer(HERE, Some(TOKEN), get(list, HERE, &format!("other=1; {cookie}"))).await;
