@@ -1,4 +1,4 @@
-//! Addresses of genotypes in which an experiment has its number or its name.
+//! Addresses of genotypes, with the number or the name of the experiment.
 
 use std::{fmt, str::FromStr};
 
@@ -6,7 +6,7 @@ use model::{Address, NotAnAddress, Who, ids::ExperimentId};
 
 use crate::subject::Subject;
 
-/// Whom of an experiment somebody means: `3@5/7`, or `leader@5/7`.
+/// A genotype of an experiment: `3@5/7`, or `leader@5/7`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedAddress {
     pub experiment: Subject,

@@ -17,7 +17,7 @@ use crate::{
     sweep::SweepArgs,
 };
 
-/// The experiment, or the group of them, that a command is about.
+/// The experiment or group that a command applies to.
 #[derive(Debug, ClapArgs)]
 pub struct Target {
     /// Number or name of the experiment, or name of a group of experiments.
@@ -60,13 +60,13 @@ pub struct ExperimentArgs {
     pub seed: SeedArg,
     #[command(flatten)]
     pub sweep: SweepArgs,
-    /// Label it, to find it by: `list --label KEY=VALUE`; may be given several times.
+    /// Label the experiment, so that `list --label KEY=VALUE` finds it. May be repeated.
     #[arg(long = "label", value_name = "KEY=VALUE", add = ArgValueCompleter::new(complete::labels))]
     pub labels: Vec<Label>,
 }
 
 impl ExperimentArgs {
-    /// An experiment file, and nothing that replaces its values.
+    /// An experiment file, without options that replace its values.
     #[cfg(test)]
     pub fn of(config: PathBuf) -> Self {
         Self {
@@ -122,14 +122,14 @@ pub struct StepsArg {
     pub steps: Option<u32>,
 }
 
-/// The group of options that take a genotype from elsewhere than the experiment file.
+/// The group of options that take a genotype from outside the experiment file.
 pub const FOREIGN: &str = "foreign";
 
-/// Whether a genotype meets another experiment file than that in which it was evolved.
+/// Whether a genotype may be used with an experiment file under which it did not evolve.
 #[derive(Debug, Clone, Copy, Default, ClapArgs)]
 pub struct ChangedArg {
-    /// Take a genotype with an experiment file in which it was not evolved; without this
-    /// option that is refused.
+    /// Accept a genotype that evolved under another experiment file, instead of refusing
+    /// it.
     #[arg(long, requires = FOREIGN)]
     pub changed_conditions: bool,
 }
@@ -137,8 +137,8 @@ pub struct ChangedArg {
 /// Vector instructions of the simulation.
 #[derive(Debug, Clone, Copy, Default, ClapArgs)]
 pub struct IsaArgs {
-    /// Vector instructions: portable, avx2, avx512 or neon. They change the speed and
-    /// no bit of the results [default: the fastest that this processor has]
+    /// Vector instructions: portable, avx2, avx512 or neon. They change the speed, but no
+    /// bit of the results [default: the fastest of this processor]
     #[arg(long, env = "SWARM_ISA", value_name = "LEVEL")]
     isa: Option<Isa>,
 }
@@ -155,7 +155,7 @@ pub fn cores() -> usize {
     thread::available_parallelism().map_or(1, Into::into)
 }
 
-/// Reads a whole number of a range, for errors that say what would be right.
+/// Reads a whole number of a range; the error states the range.
 pub fn whole<T>(
     range: RangeInclusive<T>,
 ) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static

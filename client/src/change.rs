@@ -49,21 +49,20 @@ impl From<u64> for Json {
     }
 }
 
-/// Most combinations of the values of one option.
+/// Maximum number of combinations of the values of one option.
 const COMBINATIONS_MAX: usize = 1000;
 
 /// `--set`, in all commands.
 #[derive(Debug, Clone, Default, Args)]
 pub struct SetArg {
-    /// Change values of the experiment file: `,` separates values to try, `;` changes.
+    /// Change values of the experiment file: `,` separates values to try, `;` separates changes.
     ///
-    /// A path is a place in the file as messages name it, such as
-    /// world.objects.robot.num_instances; a value is JSON, or text. `;` separates changes of one
-    /// option, `,` the values of one change; within quotes, lists and objects they separate
-    /// nothing. With several values, `run` and `submit` make a group of runs, `evaluate` several
-    /// conditions, one of each combination; `fork` and `replay` take one value of each path. The
-    /// option may be given several times: `evaluate` adds a condition for each, the other commands
-    /// take all of them together.
+    /// PATH is a place in the file, as error messages name it, such as
+    /// world.objects.robot.num_instances. VALUE is JSON or text; separators within quotes, lists
+    /// and objects do not count. With several values, `run` and `submit` make a group with one run
+    /// per combination, and `evaluate` makes one condition per combination; `fork` and `replay`
+    /// accept one value per path. The option may be repeated: `evaluate` then adds conditions for
+    /// each, and the other commands apply all changes together.
     #[arg(long, value_name = "PATH=VALUE[,...][;...]")]
     pub set: Vec<String>,
 }
@@ -84,7 +83,7 @@ impl Change {
     }
 
     /// Reads `PATH=VALUE,VALUE...; PATH=VALUE...`: for each path a change per value. Separators
-    /// within quotes, lists and objects do not separate.
+    /// within quotes, lists and objects do not count.
     pub fn parse_axes(text: &str) -> Result<Vec<Vec<Self>>, String> {
         let axis = |text: &str| {
             let (path, values) = path_and_value(text)?;
@@ -94,7 +93,7 @@ impl Change {
         split(text, ';').into_iter().map(axis).collect()
     }
 
-    /// Reads the same where every path has one value.
+    /// Reads the same format, with one value per path.
     pub fn parse_all(text: &str) -> Result<Vec<Self>, String> {
         let one = |axis: Vec<Self>| match <[Self; 1]>::try_from(axis) {
             Ok([change]) => Ok(change),
@@ -108,7 +107,7 @@ impl Change {
         Self::parse_axes(text)?.into_iter().map(one).collect()
     }
 
-    /// Reads the same: the changes for each combination of values.
+    /// Reads the same format; returns the changes for each combination of values.
     pub fn parse_combinations(text: &str) -> Result<Vec<Vec<Self>>, String> {
         let axes = Self::parse_axes(text)?;
         let count = axes.iter().map(Vec::len).fold(1, usize::saturating_mul);
@@ -144,7 +143,7 @@ impl Change {
 }
 
 impl Change {
-    /// Says that the file has no object of the name that the path leads through.
+    /// If the file lacks an object on the path: the place, and the problem.
     pub fn missing(&self, file: &Json) -> Option<(String, String)> {
         let keys: Vec<&str> = self.path.split('.').collect();
         let mut place = file;
@@ -168,7 +167,7 @@ impl fmt::Display for Change {
     }
 }
 
-/// Applies changes, or says what is wrong with each of them that has no place.
+/// Applies changes, or returns a problem for each change whose path does not exist.
 pub fn apply_all(changes: &[Change], file: &mut Json) -> Result<(), Vec<String>> {
     let applied = changes.iter().map(|change| change.apply(file));
     let problems: Vec<String> = applied.filter_map(Result::err).collect();
@@ -183,7 +182,7 @@ fn path_and_value(text: &str) -> Result<(&str, &str), String> {
     }
 }
 
-/// The parts of a text between separators that are in no quotes, list or object.
+/// Splits a text at separators outside quotes, lists and objects.
 pub fn split(text: &str, separator: char) -> Vec<&str> {
     let (mut depth, mut is_quoted, mut is_escaped) = (0i32, false, false);
     let separates = |c: char| {

@@ -1,4 +1,5 @@
-//! The command line: its commands, the options of all of them, and what the help has below them.
+//! The command line: its commands, the options of all of them, and the text below them in the
+//! help.
 
 use clap::{ArgAction, Parser};
 use swarm_telemetry::VERSION;
@@ -23,10 +24,10 @@ pub struct Args {
         value_name = "FORMAT"
     )]
     pub output: OutputFormat,
-    /// Say more while experiments are followed: digests of generations, and what is optimistic.
+    /// Print more while following experiments: digests of generations, and optimistic fitness.
     #[arg(long, short, global = true)]
     pub verbose: bool,
-    /// Print help with all options, also those that say where experiments are: --data-dir,
+    /// Print help with all options, including those that locate experiments: --data-dir,
     /// --coordinator, tokens and certificates.
     #[arg(long, global = true, action = ArgAction::HelpLong)]
     pub help_all: Option<bool>,
@@ -49,9 +50,9 @@ Examples:
 
 /// Below the examples, on the long page.
 pub const MORE: &str = "\
-The connection to the coordinator is configured by the options, else by their
-environment variables, else by the settings file. SWARM_CONFIG names that file;
-the default is ~/.config/swarmevo/config.json. For example:
+Options configure the connection to the coordinator, else environment variables,
+else the settings file. SWARM_CONFIG names that file; the default is
+~/.config/swarmevo/config.json. For example:
   {\"coordinator\": \"https://fleet.example:7700\", \"tls-ca\": \"ca.pem\",
    \"token-file\": \"client.token\"}
 
@@ -67,13 +68,13 @@ Exit codes:
   6    the experiment was cancelled (the same commands)
   7    the coordinator does not accept the token
   8    no TLS connection: one side has no TLS, or the certificate is not trusted
-  9    the server at the address is not a coordinator, or one of another version
+  9    the server at the address is not a coordinator, or has another version
   10   the experiment has not ended within watch --timeout
   11   the database is damaged
-  12   the bundle is not what it says (verify)
-  71   the system gives it too few threads or file descriptors, or too little memory
+  12   a claim of the bundle is false (verify)
+  71   the system provides too few threads or file descriptors, or too little memory
   130  interrupted
-  141  standard output was closed (watch, help); the other commands go on without it";
+  141  standard output was closed (watch, help); other commands continue";
 
 #[cfg(test)]
 mod tests {

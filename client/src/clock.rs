@@ -8,7 +8,7 @@ pub fn unix_ms() -> u64 {
 }
 
 /// The time, to compare dates with.
-#[expect(clippy::disallowed_methods, reason = "ages are told from now")]
+#[expect(clippy::disallowed_methods, reason = "ages are relative to now")]
 pub fn today() -> SystemTime {
     SystemTime::now()
 }
@@ -60,7 +60,7 @@ pub fn duration_ms(ms: u64) -> String {
     duration(Duration::from_millis(ms))
 }
 
-/// The age of a time; 0 if the clocks differ so that it is in the future.
+/// The age of a time; 0 if the time is in the future because clocks differ.
 pub fn ago(at_ms: u64, now_ms: u64) -> String {
     let age = Duration::from_secs(now_ms.saturating_sub(at_ms) / 1000);
     format!("{} ago", duration(age))

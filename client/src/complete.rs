@@ -1,4 +1,4 @@
-//! The words that a shell completes: experiments, groups, labels and workers in quarantine.
+//! Values that a shell completes: experiments, groups, labels and workers in quarantine.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -19,16 +19,16 @@ use crate::{
     settings::Settings,
 };
 
-/// Nobody waits longer for a completion.
+/// Time limit of a completion.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What a word may become that stands for an experiment or a group: what there is in the place of
-/// the command line, the environment and the settings file; nothing if it does not answer.
+/// Completions of an experiment or group: those in the place that the command line, the
+/// environment or the settings file names; empty if the place does not answer.
 pub fn experiments(word: &OsStr) -> Vec<CompletionCandidate> {
     offered(word, candidates(&all_experiments()))
 }
 
-/// The groups that there are.
+/// Completions of a group.
 pub fn groups(word: &OsStr) -> Vec<CompletionCandidate> {
     let all = all_experiments();
     let groups = all
@@ -38,7 +38,7 @@ pub fn groups(word: &OsStr) -> Vec<CompletionCandidate> {
     offered(word, described(groups.collect(), "group"))
 }
 
-/// The labels that experiments have.
+/// Completions of a label.
 pub fn labels(word: &OsStr) -> Vec<CompletionCandidate> {
     let all = all_experiments();
     let labels = all
@@ -48,14 +48,14 @@ pub fn labels(word: &OsStr) -> Vec<CompletionCandidate> {
     offered(word, described(labels.collect(), "label"))
 }
 
-/// The keys of these.
+/// Completions of the key of a label.
 pub fn label_keys(word: &OsStr) -> Vec<CompletionCandidate> {
     let all = all_experiments();
     let keys = all.iter().flat_map(|experiment| experiment.labels.keys().cloned());
     offered(word, described(keys.collect(), "label"))
 }
 
-/// The workers in quarantine.
+/// Completions of a worker in quarantine.
 pub fn quarantined(word: &OsStr) -> Vec<CompletionCandidate> {
     let workers = fetched(async |connection| {
         let request = ListWorkersRequest {};
@@ -79,14 +79,14 @@ pub fn experiments_and_files(word: &OsStr) -> Vec<CompletionCandidate> {
     all
 }
 
-/// The options of a command line that say where experiments are.
+/// The options of a command line that locate experiments.
 #[derive(Debug, Parser)]
 struct PlaceArgs {
     #[command(flatten)]
     settings: Settings,
 }
 
-/// What the command line says so far of the place.
+/// The place that the unfinished command line names.
 fn place() -> Vec<String> {
     let words: Vec<String> = env::args().collect();
     let mut found = vec!["swarmctl".to_owned()];
@@ -106,8 +106,8 @@ fn all_experiments() -> Vec<Experiment> {
     fetched(async |connection| connection.experiments().await.ok()).unwrap_or_default()
 }
 
-/// What the place answers in time. The shell asks from within this program's runtime, which nothing
-/// may block.
+/// The answer of the place, if it comes in time. Completion runs within this program's runtime,
+/// which must not block.
 fn fetched<T: Send + 'static>(
     ask: impl AsyncFnOnce(Connection) -> Option<T> + Send + 'static,
 ) -> Option<T> {
@@ -124,12 +124,12 @@ fn fetched<T: Send + 'static>(
     thread::spawn(fetch).join().ok().flatten()
 }
 
-/// Each with the same help.
+/// Gives all candidates the same help.
 fn described(values: BTreeSet<String>, help: &str) -> Vec<(String, String)> {
     values.into_iter().map(|value| (value, help.to_owned())).collect()
 }
 
-/// Those that a word may become.
+/// The candidates that begin with a word.
 fn offered(word: &OsStr, candidates: Vec<(String, String)>) -> Vec<CompletionCandidate> {
     let word = word.to_string_lossy();
     candidates
@@ -139,7 +139,7 @@ fn offered(word: &OsStr, candidates: Vec<(String, String)>) -> Vec<CompletionCan
         .collect()
 }
 
-/// Numbers, then names that stand for one experiment or a group, each with what it is.
+/// Numbers, then names of one experiment or of a group, each with a description.
 fn candidates(all: &[Experiment]) -> Vec<(String, String)> {
     let mut candidates: Vec<(String, String)> = all
         .iter()
@@ -185,9 +185,9 @@ mod tests {
 
     #[test]
     fn whatever_a_place_has_is_offered_wherever_it_is_meant() {
-        /// What is new, and so is nowhere yet.
+        /// Values that are new, so nothing can complete them.
         const NEW: [&str; 3] = ["fork --name <NAME>", "new <NAME>", "slurm --job-name <NAME>"];
-        /// What files say that are named beside it.
+        /// Values from a file that the command line names.
         const OF_FILES: [&str; 2] = ["plot --metric <NAME>", "plot --condition <NAME>"];
         let mut definition = Args::command();
         definition.build();

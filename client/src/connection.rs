@@ -1,4 +1,4 @@
-//! Requests to the coordinator, repeated while it cannot be reached; or to the same services in
+//! Requests to the coordinator, repeated while it is unreachable; or to the same services in
 //! this process, on a data directory.
 
 mod requests;
@@ -39,18 +39,18 @@ use crate::{
 const PATIENCE: Duration = Duration::from_secs(2);
 /// The same, while a command follows an experiment.
 pub const PATIENCE_WHILE_FOLLOWING: Duration = Duration::from_secs(60);
-/// Longest time of a call that is not a stream.
+/// Time limit of a call that is not a stream.
 const CALL_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// A channel on which every call carries the token, if there is one.
+/// A channel that adds the token, if any, to every call.
 type Authorised = InterceptedService<Channel, Bearer>;
 
-/// How the services are reached.
+/// The transport to the services.
 #[derive(Debug, Clone)]
 enum Way {
     /// Over the network.
     Link(Box<Link>),
-    /// They are in this process.
+    /// To services in this process.
     Here(Arc<Here>),
 }
 
@@ -59,9 +59,9 @@ enum Way {
 struct Here {
     data_dir: PathBuf,
     door: Door,
-    /// None if there are workers, too, and somebody else stops it all.
+    /// None if there are workers, too, and another owner stops everything.
     services: Option<InProcess>,
-    /// Numbers of the experiments that were set going here.
+    /// Numbers of the experiments that this process has started.
     set_going: Mutex<Vec<u64>>,
 }
 
@@ -79,8 +79,8 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// A connection to the place of the settings, the environment and the settings file. One that
-    /// nobody has named is said.
+    /// A connection to the place of the settings, the environment or the settings file. Prints
+    /// the place unless the user has named it.
     pub async fn open(
         settings: Settings,
         intent: Intent,
@@ -110,7 +110,7 @@ impl Connection {
         Ok(Self::here(data_dir, services.door().clone(), Some(services)))
     }
 
-    /// A connection to the coordinator in this process that computes what is in a data directory.
+    /// A connection to the coordinator in this process that computes a data directory.
     #[cfg(feature = "local")]
     pub fn computing(data_dir: &Path, door: Door) -> Self {
         Self::here(data_dir, door, None)
@@ -120,7 +120,7 @@ impl Connection {
         let channel = door.channel(Some(CALL_TIMEOUT));
         let here = Here { data_dir: data_dir.into(), door, services, set_going: Mutex::default() };
         let address = data_dir.display().to_string();
-        // What fails here fails again.
+        // A failure in this process is not transient.
         let this = Self::on(address, Way::Here(Arc::new(here)), &channel);
         this.with_patience(Duration::ZERO)
     }
@@ -141,7 +141,7 @@ impl Connection {
         Self { address, way, client, evaluations, fleet, patience: PATIENCE }
     }
 
-    /// Ends what was started for it.
+    /// Ends the services that were started for it.
     pub async fn close(self) {
         let Self { way, client, evaluations, fleet, .. } = self;
         drop((client, evaluations, fleet));
@@ -152,7 +152,7 @@ impl Connection {
         }
     }
 
-    /// The data directory, if no coordinator is asked.
+    /// The data directory, unless requests go to a coordinator.
     pub fn data_dir(&self) -> Option<&Path> {
         match &self.way {
             Way::Link(_) => None,
@@ -160,18 +160,19 @@ impl Connection {
         }
     }
 
-    /// The data directory, if commands do not find it by themselves.
+    /// The data directory, unless commands find it by themselves.
     pub fn named_place(&self) -> Option<String> {
         let data_dir = self.data_dir().filter(|path| *path != Path::new(DEFAULT_DATA_DIR))?;
         Some(data_dir.display().to_string())
     }
 
-    /// Whether experiments are computed by this process, and by no other.
+    /// Whether this process, and no other, computes experiments.
     pub fn computes(&self) -> bool {
         matches!(&self.way, Way::Here(here) if here.services.is_none())
     }
 
-    /// Remembers that experiments are computed here, to say how to go on with them.
+    /// Remembers the experiments that this process computes, for advice on how to
+    /// continue them.
     pub fn set_going(&self, experiments: &[Experiment]) {
         if let Way::Here(here) = &self.way {
             let ids = experiments.iter().map(|experiment| experiment.id);
@@ -179,7 +180,7 @@ impl Connection {
         }
     }
 
-    /// Numbers of the experiments that were set going here.
+    /// Numbers of the experiments that this process has started.
     pub fn going(&self) -> Vec<u64> {
         match &self.way {
             Way::Here(here) => {
@@ -197,7 +198,7 @@ impl Connection {
         }
     }
 
-    /// The same connection, which repeats requests for this long.
+    /// The same connection, with another time of repeating requests.
     pub fn with_patience(&self, patience: Duration) -> Self {
         Self { patience, ..self.clone() }
     }
@@ -212,7 +213,7 @@ impl Connection {
         self.patience
     }
 
-    /// The error that the coordinator cannot be reached.
+    /// The error that the coordinator is unreachable.
     pub fn unreachable(&self, reason: String) -> Error {
         Error::Unreachable { address: self.address.clone(), reason }
     }
@@ -231,13 +232,13 @@ impl Connection {
         }
     }
 
-    /// A client for requests that take the coordinator long.
+    /// A client for requests that take a long time.
     fn patient(&self) -> ExperimentServiceClient<Authorised> {
         self.way.experiments(&self.way.patient_channel())
     }
 
-    /// Sends a request to the experiment service, again and again while the coordinator
-    /// cannot be reached, up to this connection's patience.
+    /// Sends a request to the experiment service, and retries while the coordinator is
+    /// unreachable, up to this connection's patience.
     pub async fn call<T>(
         &self,
         request: impl AsyncFn(&mut ExperimentServiceClient<Authorised>) -> Result<Response<T>, Status>,
@@ -245,7 +246,7 @@ impl Connection {
         self.ask(async || request(&mut self.client.clone()).await).await
     }
 
-    /// As [`Self::call`], to the fleet service.
+    /// Like [`Self::call`], for the fleet service.
     pub async fn call_fleet<T>(
         &self,
         request: impl AsyncFn(&mut FleetServiceClient<Authorised>) -> Result<Response<T>, Status>,
@@ -257,11 +258,11 @@ impl Connection {
         &self,
         request: impl AsyncFn() -> Result<Response<T>, Status>,
     ) -> Result<T, Error> {
-        // On the heap, so that commands, which are made of such requests, take little stack.
+        // On the heap, so that the futures of commands take little stack.
         Box::pin(self.retry(request, async || self.waits(None))).await
     }
 
-    /// `waits`: for what, while the coordinator is reached.
+    /// `waits`: what the command waits for while the coordinator is reachable.
     async fn retry<T>(
         &self,
         request: impl AsyncFn() -> Result<Response<T>, Status>,
@@ -283,7 +284,7 @@ impl Connection {
                 }
             }
         };
-        // With little patience, whoever cannot be reached is reported soon.
+        // With little patience, an unreachable coordinator is reported soon.
         let what = async || {
             let failure = lock(&failure).clone();
             match failure {
@@ -295,7 +296,7 @@ impl Connection {
         waiting::aloud(what, repeated).await
     }
 
-    /// What is waited for. `failure`: of the last attempt.
+    /// A description of the wait. `failure`: of the last attempt.
     pub fn waits(&self, failure: Option<&str>) -> String {
         match failure {
             None => match &self.way {
@@ -309,7 +310,7 @@ impl Connection {
         }
     }
 
-    /// If another server answers at the address, says so.
+    /// Names another kind of server, if one answers at the address.
     async fn diagnose(&self, error: Error) -> Error {
         let (Error::Unreachable { .. }, Way::Link(link)) = (&error, &self.way) else {
             return error;
@@ -333,7 +334,7 @@ impl Way {
         }
     }
 
-    /// A channel whose calls may take as long as they like.
+    /// A channel whose calls have no time limit.
     fn patient_channel(&self) -> Channel {
         match self {
             Self::Link(link) => endpoint(link).connect_lazy(),
@@ -354,7 +355,7 @@ impl Way {
     }
 }
 
-/// A coordinator, connected to when it is first needed.
+/// A channel to a coordinator, which connects when it is first used.
 fn endpoint(link: &Link) -> Endpoint {
     link.endpoint
         .clone()
@@ -397,7 +398,7 @@ mod tests {
         let address = listener.local_addr().unwrap();
         thread::spawn(move || {
             for stream in listener.incoming() {
-                // A client that is gone needs no answer.
+                // A client that has gone needs no answer.
                 let _ = stream.and_then(|mut stream| stream.write_all(b"220 mail ESMTP\r\n"));
             }
         });

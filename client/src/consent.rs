@@ -1,4 +1,4 @@
-//! Whether people want what cannot be undone: `--yes`, `--dry-run`, or a question.
+//! Consent to changes that cannot be undone: `--yes`, `--dry-run`, or a question.
 
 use std::{
     io::{self, IsTerminal as _},
@@ -12,32 +12,32 @@ use tokio::sync::oneshot;
 
 use crate::{error::Error, json, progress::Progress, text};
 
-/// Before something is done to several experiments that cannot be undone.
+/// Options of commands that change several experiments for good.
 #[derive(Debug, Args)]
 pub struct Consent {
-    /// Ask no question before several experiments are changed; needed where nobody can answer.
+    /// Change several experiments without asking; needed where nobody can answer.
     #[arg(long, short)]
     yes: bool,
-    /// Say what would be done, and do nothing.
+    /// Print the planned changes, and make none.
     #[arg(long, conflicts_with = "yes")]
     dry_run: bool,
 }
 
-/// What is to happen.
+/// What the command does.
 #[derive(Debug, PartialEq, Eq)]
 enum Next {
-    /// It is done.
+    /// It makes the changes.
     Do,
-    /// It is only listed.
+    /// It only lists the changes.
     List,
-    /// People are asked.
+    /// It asks the user.
     Ask,
-    /// Nobody can be asked.
+    /// It fails, because no user can answer.
     Refuse,
 }
 
 impl Consent {
-    /// Whether it is to be done to these experiments. `what`: the command's name, a verb.
+    /// Whether to change these experiments. `what`: the command's name, a verb.
     pub async fn is_given(
         &self,
         what: &str,
@@ -90,12 +90,12 @@ fn ids(experiments: &[Experiment]) -> Vec<u64> {
     experiments.iter().map(|experiment| experiment.id).collect()
 }
 
-/// A line of standard input, from a thread that an interrupt need not wait for.
+/// A line of standard input, read on a thread that an interrupt can abandon.
 async fn answer() -> String {
     let (sender, receiver) = oneshot::channel();
     thread::spawn(move || {
         let mut line = String::new();
-        // What cannot be read is no consent.
+        // An unreadable answer is no consent.
         let _ = io::stdin().read_line(&mut line);
         let _ = sender.send(line);
     });

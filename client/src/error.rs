@@ -19,7 +19,7 @@ use crate::{
 /// Why a command did not succeed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Bad input; the message says what would be right.
+    /// Bad input; the message states the correct input.
     #[error("{0}")]
     Input(String),
     /// An experiment file with problems.
@@ -30,9 +30,9 @@ pub enum Error {
         /// The problems, one per line.
         problems: String,
     },
-    /// Some runs of a group were submitted before this error.
+    /// This error came after some runs of a group were submitted.
     #[error(
-        "{n_submitted} of {n_runs} runs are submitted, the same command again adds the others: \
+        "{n_submitted} of {n_runs} runs are submitted; repeat the command to submit the others: \
          {cause}"
     )]
     Incomplete {
@@ -40,17 +40,17 @@ pub enum Error {
         n_submitted: usize,
         /// Number of runs of the group.
         n_runs: usize,
-        /// What happened to the next one.
+        /// The error of the next run.
         cause: Box<Error>,
     },
-    /// Some experiments of a group were not changed.
+    /// Some experiments of a group are unchanged.
     #[error("{n_changed} of {n_all} experiments are changed, these are not:\n{lines}")]
     Partly {
-        /// Number of those that were changed.
+        /// Number of changed experiments.
         n_changed: usize,
-        /// Number of those that were to be.
+        /// Number of experiments to change.
         n_all: usize,
-        /// The others, one per line, each with the reason.
+        /// The unchanged ones, one per line, each with the reason.
         lines: String,
         /// The first reason.
         cause: Box<Error>,
@@ -66,7 +66,7 @@ pub enum Error {
     Unreachable {
         /// The coordinator's address.
         address: String,
-        /// The deepest cause that is known.
+        /// The deepest known cause.
         reason: String,
     },
     /// The coordinator does not accept the token.
@@ -82,7 +82,7 @@ pub enum Error {
     Tls {
         /// The coordinator's address.
         address: String,
-        /// What is wrong and what to do.
+        /// The problem and its remedy.
         diagnosis: String,
     },
     /// The server at the address is not a coordinator, or does not know the request.
@@ -93,7 +93,7 @@ pub enum Error {
     Failed {
         /// Number of the experiment.
         id: u64,
-        /// Why; may be empty.
+        /// The reason; may be empty.
         reason: String,
     },
     /// The experiment was cancelled.
@@ -101,7 +101,7 @@ pub enum Error {
     Cancelled {
         /// Number of the experiment.
         id: u64,
-        /// Why; may be empty.
+        /// The reason; may be empty.
         reason: String,
     },
     /// The experiment has not ended within the time limit of `watch`.
@@ -113,22 +113,23 @@ pub enum Error {
     /// A database is damaged.
     #[error("{0}")]
     Damaged(String),
-    /// A bundle is not what it says.
+    /// A claim of a bundle is false.
     #[error("{0}")]
     Flawed(String),
-    /// The system gives this program too little to start.
+    /// The system provides too few resources to start this program.
     #[error(transparent)]
     Starved(#[from] swarm_telemetry::Starved),
-    /// A signal interrupted the command; the text says what happens to the experiment.
+    /// A signal interrupted the command; the text states the consequences for the
+    /// experiment.
     #[error("interrupted; {0}")]
     Interrupted(String),
-    /// The reader of standard output closed it, and the command does nothing but print.
-    #[error("standard output is closed, so this command ends; experiments go on")]
+    /// The reader of standard output closed it, and the command only prints.
+    #[error("standard output is closed, so this command ends; experiments continue")]
     OutputClosed,
     /// Standard output, or a file, cannot be written.
     #[error("cannot write {what}: {source}")]
     Write {
-        /// What was to be written.
+        /// The destination.
         what: String,
         /// The cause.
         source: io::Error,
@@ -153,7 +154,7 @@ impl Error {
         ))
     }
 
-    /// Whether the same request for another experiment would fail of the same.
+    /// Whether the same request for another experiment would fail for the same reason.
     pub fn concerns_all(&self) -> bool {
         matches!(
             self,
@@ -183,7 +184,7 @@ impl Error {
         }
     }
 
-    /// What to print on standard error.
+    /// The report for standard error.
     pub fn report(&self) -> String {
         match self {
             Self::Config { file, problems } => prefix_lines(problems, &file.display()),
@@ -192,14 +193,14 @@ impl Error {
         }
     }
 
-    /// The report, in lines of a terminal of this width; none if it is no terminal. A line about a
-    /// place in a file stays whole: editors follow it.
+    /// The report, wrapped for a terminal of this width; `None`: no terminal. Lines about a place
+    /// in a file stay whole, because editors parse them.
     pub fn report_within(&self, width: Option<usize>) -> String {
         let width = width.filter(|_| !matches!(self, Self::Config { .. }));
         text::fitting(&self.report(), width)
     }
 
-    /// The error of reading a data directory, or of making one.
+    /// The error of reading or creating a data directory.
     pub fn from_store(error: &StoreError) -> Self {
         let text = error.to_string();
         match error {
@@ -215,7 +216,7 @@ impl Error {
         }
     }
 
-    /// The error that a path is no data directory: what else it is, or `text`.
+    /// The error that a path is no data directory: names its kind, or else is `text`.
     fn no_data_directory(path: &Path, text: String) -> Self {
         Self::Input(match file_kind::expect(path, &[Kind::DataDirectory], "a data directory") {
             Err(other) => format!("{}: {other}", path.display()),
@@ -275,7 +276,7 @@ impl Error {
     }
 }
 
-/// Whether the same request may succeed later without any change by the user.
+/// Whether the same request may succeed later without a change by the user.
 pub fn is_transient(status: &Status) -> bool {
     let code = status.code();
     if tls_diagnosis(status).is_some() {
@@ -284,11 +285,11 @@ pub fn is_transient(status: &Status) -> bool {
     is_transport(status) || matches!(code, Code::Aborted | Code::ResourceExhausted)
 }
 
-/// Where else HTTP is spoken.
+/// The other servers that speak HTTP.
 const PORTS: &str = " Pages (--web-listen) and metrics (--metrics-listen) have ports of their \
                      own; a coordinator's is 7700 unless its --listen is another one";
 
-/// Whether an answer is one of HTTP, and none of gRPC, by the texts of tonic.
+/// Whether an answer is HTTP but not gRPC, according to the messages of tonic.
 fn is_no_grpc(status: &Status) -> bool {
     let message = status.message();
     message.contains("invalid compression flag")
@@ -296,8 +297,8 @@ fn is_no_grpc(status: &Status) -> bool {
         || message.contains("invalid content-type")
 }
 
-/// Whether the status is about the connection. A status that this side creates has a
-/// source, one that a coordinator sent has none.
+/// Whether the status is about the connection. A status created on this side has a
+/// source; one sent by a coordinator has none.
 fn is_transport(status: &Status) -> bool {
     let code = status.code();
     std::error::Error::source(status).is_some()
@@ -315,7 +316,7 @@ pub fn reason(status: &Status) -> String {
     if text.is_empty() { status.code().description().into() } else { text }
 }
 
-/// A text with a name before each line.
+/// A text with a prefix before each line.
 pub fn prefix_lines(text: &str, name: &impl std::fmt::Display) -> String {
     let lines: Vec<String> = text.lines().map(|line| format!("{name}: {line}")).collect();
     lines.join("\n")

@@ -1,5 +1,5 @@
-//! The experiments that this program brings with it, so that nobody needs a copy of the repository
-//! to evolve one, or to begin with one.
+//! The experiments that are part of this program, so that users can evolve or copy one without the
+//! repository.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ pub struct Example {
     alias: Option<&'static str>,
     /// The experiment file.
     pub config: &'static str,
-    /// Its script, if its task is none of those that are built in.
+    /// Its script, unless its task is built in.
     pub script: Option<&'static str>,
     /// The experiment, in a sentence.
     pub about: &'static str,
@@ -62,10 +62,10 @@ pub const EXAMPLES: [Example; 15] = [
     scripted!("aggregation", "Robots gather; they sense how near others are"),
     scripted!("scent", "Robots find a source with a sensor that the script defines"),
     scripted!("flocking", "Robots travel together; the fitness is a product of three measures"),
-    scripted!("foraging", "Robots carry food to a nest; the script remembers who is loaded"),
+    scripted!("foraging", "Robots carry food to a nest; the script remembers the loaded robots"),
     scripted!(
         "predator",
-        "Robots flee from a light that the script moves; whoever is caught stands still"
+        "Robots flee from a light that the script moves; caught robots stand still"
     ),
     scripted!("chain", "Robots connect two areas: each hears the next"),
     scripted!("division_of_labour", "Robots divide: half of them on each of two areas"),
@@ -80,7 +80,7 @@ pub const EXAMPLES: [Example; 15] = [
         "borderline_snes",
         "",
         "borderline",
-        "Experiment B: the robots at the border of the swarm find out that they are"
+        "Experiment B: robots find out whether they are at the border of the swarm"
     ),
     built_in!(
         "orientation_consensus_snes",

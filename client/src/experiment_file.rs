@@ -35,7 +35,7 @@ pub struct Overrides {
     pub trials: Option<u32>,
 }
 
-/// An experiment file, ready to be simulated.
+/// An experiment file, ready for simulation.
 #[derive(Debug)]
 pub struct Compiled {
     pub config: ExperimentConfig,
@@ -51,24 +51,24 @@ impl ExperimentFile {
         Self { path, text }
     }
 
-    /// Where it is, for messages.
+    /// Its path, for messages.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The name that it gives its experiment; none if it cannot be read.
+    /// The name of its experiment; none if the file cannot be read.
     pub fn name(&self) -> Option<String> {
         let read = ExperimentConfig::from_json(&self.text, &self.default_name(), ALGORITHMS);
         read.ok().map(|(config, _)| config.name)
     }
 
-    /// The error of this file being invalid.
+    /// The error that this file is invalid.
     pub fn invalid(&self, error: &ConfigError) -> Error {
         Error::invalid(&self.path, error)
     }
 
-    /// Reads a file of UTF-8 text of at most 1 MiB; `-` is standard input. The script that
-    /// it refers to, by a path from the file's folder, becomes part of it.
+    /// Reads a file of UTF-8 text of at most 1 MiB; `-` is standard input. Includes the
+    /// script that the file names by a path relative to its folder.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let problem = |path: &str, what: String| ConfigError {
             problems: vec![Problem {
@@ -95,7 +95,7 @@ impl ExperimentFile {
         Ok(Self { path: path.into(), text: inline_script(&text, place, &script) })
     }
 
-    /// This file with changes, if they leave it one that can be read.
+    /// This file with changes, if it remains readable.
     pub fn changed(&self, changes: &[Change]) -> Result<Self, ConfigError> {
         if changes.is_empty() {
             return Ok(self.clone());
@@ -110,7 +110,7 @@ impl ExperimentFile {
         let text = json::line(&file);
         match read(&text).map_err(without_lines) {
             Ok(_) => Ok(Self { path: self.path.clone(), text }),
-            // What is wrong with an object that is there by mistake does not matter.
+            // Problems of an object whose name is a mistake do not matter.
             Err(mut error) => {
                 for (path, message) in missing {
                     error.problems.retain(|problem| !problem.path.starts_with(&path));
@@ -121,7 +121,7 @@ impl ExperimentFile {
         }
     }
 
-    /// Checks the experiment as the coordinator will.
+    /// Checks the experiment like the coordinator.
     pub fn check(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
         let mut compiled = self.compile(overrides)?;
         let started = clock::now();
@@ -132,7 +132,7 @@ impl ExperimentFile {
         Ok(compiled)
     }
 
-    /// Makes the experiment ready to be simulated.
+    /// Prepares the experiment for simulation.
     pub fn compile(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
         let (config, mut warnings) =
             ExperimentConfig::from_json(&self.text, &self.default_name(), ALGORITHMS)?;
@@ -142,7 +142,7 @@ impl ExperimentFile {
         Ok(Compiled { config, experiment, warnings })
     }
 
-    /// The request to submit it; `request_id` makes it safe to repeat.
+    /// The request that submits it; `request_id` makes repeating it safe.
     pub fn request(&self, overrides: &Overrides, request_id: String) -> SubmitExperimentRequest {
         SubmitExperimentRequest {
             request_id,
@@ -154,7 +154,7 @@ impl ExperimentFile {
         }
     }
 
-    /// Names this file in a coordinator's refusal of it.
+    /// Adds the name of this file to a coordinator's error about it.
     pub fn locate(&self, error: Error) -> Error {
         match error {
             Error::Input(problems) => Error::Config { file: self.path.clone(), problems },
@@ -198,7 +198,7 @@ impl Overrides {
     }
 }
 
-/// The problems of a text that is not the user's, without the lines of it.
+/// The problems of a generated text, without line numbers.
 fn without_lines(mut error: ConfigError) -> ConfigError {
     error.problems.iter_mut().for_each(|problem| problem.line = None);
     error
@@ -225,7 +225,7 @@ pub mod tests {
         Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../configs/{name}.json"))
     }
 
-    /// The smallest of them, evolved by SNES.
+    /// The smallest experiment, evolved by SNES.
     pub fn quickstart() -> PathBuf {
         shipped("quickstart")
     }

@@ -1,15 +1,15 @@
-//! The experiments of a place: all, some of them, and those that a name stands for.
+//! The experiments of a place: all, filtered, or by name.
 
 use experiment_file::suggestion;
 use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
 use crate::{connection::Connection, error::Error, file_kind, subject::Subject};
 
-/// Experiments in one answer: far fewer than make a message too long.
+/// Number of experiments in one answer: far below the limit of a message.
 const PAGE_LEN: u32 = 2_000;
 
 impl Connection {
-    /// The experiments that are wanted, oldest first.
+    /// The requested experiments, oldest first.
     pub async fn list(&self, wanted: ListExperimentsRequest) -> Result<Vec<Experiment>, Error> {
         let mut request = ListExperimentsRequest { page_size: PAGE_LEN, ..wanted };
         let mut all: Vec<Experiment> = Vec::new();
@@ -17,7 +17,7 @@ impl Connection {
             let page = request.clone();
             let answer = self.call(async |client| client.list_experiments(page.clone()).await);
             let page = answer.await?.experiments;
-            // A coordinator of an earlier version knows no pages, and sends everything each time.
+            // A coordinator of an earlier version ignores pages, and always sends everything.
             if page.first().is_some_and(|first| first.id <= request.after) {
                 return Ok(all);
             }
@@ -35,7 +35,7 @@ impl Connection {
         self.list(ListExperimentsRequest::default()).await
     }
 
-    /// Those that are running, oldest first.
+    /// The running experiments, oldest first.
     pub async fn running(&self) -> Result<Vec<Experiment>, Error> {
         let states = vec![ExperimentState::Running.into()];
         self.list(ListExperimentsRequest { states, ..Default::default() }).await
@@ -49,7 +49,7 @@ impl Connection {
         }
     }
 
-    /// The one experiment of a number or a name; an error if it is a group of several.
+    /// The one experiment of a number or a name; fails if the name is a group of several.
     pub async fn one(&self, subject: &Subject) -> Result<Experiment, Error> {
         let mut found = self.subject(subject).await?;
         match found.len() {
@@ -61,8 +61,8 @@ impl Connection {
     /// The experiments of a group, oldest first; or the one experiment of that name.
     pub async fn group(&self, name: &str) -> Result<Vec<Experiment>, Error> {
         let wanted = ListExperimentsRequest { named: name.to_owned(), ..Default::default() };
-        // One of an earlier version knows no names either, and whoever is cancelled by a name must be
-        // of it.
+        // A coordinator of an earlier version ignores names, too. Check the name, because a
+        // command may cancel these experiments.
         let (members, others): (Vec<Experiment>, Vec<Experiment>) =
             self.list(wanted).await?.into_iter().partition(|experiment| experiment.group == name);
         if !members.is_empty() {
@@ -78,7 +78,7 @@ impl Connection {
     }
 }
 
-/// The error that a name stands for nothing.
+/// The error that a name is unknown.
 fn unknown(name: &str, all: &[Experiment]) -> Error {
     let names = all.iter().flat_map(|experiment| [&*experiment.group, &*experiment.name]);
     let mut names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
@@ -87,12 +87,12 @@ fn unknown(name: &str, all: &[Experiment]) -> Error {
     let what = format!("no group or experiment is named `{name}`");
     Error::NotFound(match file_kind::of_word(name) {
         Some(file) => format!("{what}, and {file}"),
-        None if names.is_empty() => format!("{what}: there are no experiments"),
+        None if names.is_empty() => format!("{what}: no experiment exists"),
         None => format!("{what}; {}", suggestion(name, &names)),
     })
 }
 
-/// The error that a name stands for several experiments where one is meant.
+/// The error that a name is ambiguous.
 fn several(name: &str, experiments: &[Experiment]) -> Error {
     let ids: Vec<String> =
         experiments.iter().take(10).map(|experiment| experiment.id.to_string()).collect();

@@ -42,22 +42,21 @@ use crate::connection::Connection;
 /// The answers to give, and a record of requests.
 #[derive(Debug, Default)]
 pub struct Script {
-    /// The one experiment that there is.
+    /// The only experiment.
     pub experiment: Experiment,
     pub champion: Option<GetChampionResponse>,
-    /// What has happened to it, from event 1 on without gaps.
+    /// Its events, from event 1 on without gaps.
     pub past: Vec<Event>,
     /// The answer to `Explain`, without the experiment.
     pub explanation: ExplainExperimentResponse,
     pub workers: Vec<Worker>,
-    /// For each `Watch` in turn: its events, and what then ends the stream if
-    /// not the end of events.
+    /// For each `Watch` in turn: its events, and the error that ends the stream, if any.
     pub watches: VecDeque<(Vec<Event>, Option<Status>)>,
-    /// For each `Submit` in turn: a refusal, or OK. Afterwards it is accepted.
+    /// For each `Submit` in turn: a refusal, or OK. Later calls are accepted.
     pub submit_refusals: VecDeque<Status>,
     pub watched_from: Vec<u64>,
     pub submitted: Vec<SubmitExperimentRequest>,
-    /// Number of an experiment that is identical to what is submitted; 0 for none.
+    /// Number of an experiment that is identical to a submission; 0 for none.
     pub identical: u64,
 }
 

@@ -9,15 +9,15 @@ use std::path::Path;
 
 use crate::{error::Error, output_file::Overwrite};
 
-/// Most curves of a figure: more could not be told apart.
+/// Maximum number of curves of a figure: more would be indistinguishable.
 pub const CURVES_MAX: usize = 14;
 
 /// Curves over the same axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// What is shown, above everything; empty: nothing.
+    /// The title, at the top; empty: no title.
     pub title: String,
-    /// What line and band are, below the title.
+    /// The meaning of line and band, below the title.
     pub caption: String,
     /// Label of the x axis.
     pub x_label: String,
@@ -56,7 +56,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Refuses a file with a bad name, and one that may not be written over.
+    /// Refuses a bad file name, and a file that may not be replaced.
     pub fn check(path: &Path, overwrite: Overwrite) -> Result<(), Error> {
         Self::of_path(path)?;
         overwrite.check(path)

@@ -1,5 +1,4 @@
-//! Kinds of files of this program, for messages that say what a file is where another one is
-//! expected.
+//! Kinds of files of this program, for messages about a file of an unexpected kind.
 
 use std::{
     fs::{self, File},
@@ -15,10 +14,10 @@ use crate::{
     text::shell_command,
 };
 
-/// So many bytes say what is no JSON.
+/// Bytes that suffice to recognise files that are not JSON.
 const HEAD_LEN: u64 = 512;
 
-/// What a file, or a directory, is.
+/// The kind of a file or a directory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     Experiment,
@@ -44,7 +43,7 @@ pub enum Kind {
     Replay,
 }
 
-/// How tables of this program begin.
+/// First lines of tables of this program.
 const TABLES: [(&str, Kind); 7] = [
     ("experiment,generation,best,", Kind::History),
     ("experiment,generation,mean_step,", Kind::Dynamics),
@@ -55,7 +54,7 @@ const TABLES: [(&str, Kind); 7] = [
     ("condition,trial,metric,", Kind::Evaluation),
 ];
 
-/// How other files begin.
+/// First bytes of other files.
 const BEGINNINGS: [(&[u8], Kind); 6] = [
     (b"PK\x03\x04", Kind::Bundle),
     (b"SQLite format 3\0", Kind::Database),
@@ -65,7 +64,7 @@ const BEGINNINGS: [(&[u8], Kind); 6] = [
     (b"<!doctype html>", Kind::Replay),
 ];
 
-/// JSON by keys that all of its kind have, the most particular first.
+/// Kinds of JSON by keys that all files of a kind have, the most specific first.
 const OBJECTS: [(&[&str], Kind); 9] = [
     (&["topology"], Kind::Experiment),
     (&["algorithm"], Kind::Experiment),
@@ -79,7 +78,7 @@ const OBJECTS: [(&[&str], Kind); 9] = [
 ];
 
 impl Kind {
-    /// What there is at a path; none if it is nothing of this program.
+    /// The kind of the file at a path; none if it is not of this program.
     pub fn of_path(path: &Path) -> Option<Self> {
         if is_stdin(path) {
             return None;
@@ -90,7 +89,7 @@ impl Kind {
             let is_data = store::is_in(path).then_some(Self::DataDirectory);
             return is_data.or(is_evaluation.then_some(Self::EvaluationDirectory));
         }
-        // Others give away what they hold only once.
+        // Reading a pipe or a device would consume its data.
         if !found.is_file() {
             return None;
         }
@@ -131,7 +130,7 @@ impl Kind {
             Self::Generation => "a generation of individuals",
             Self::Genes => "a list of genes",
             Self::History => "the history of a run",
-            Self::Dynamics => "a table of how evolution moved",
+            Self::Dynamics => "a table of the movement of evolution",
             Self::List => "a list of experiments",
             Self::Workers => "a list of workers",
             Self::Trace => "the trace of a simulation",
@@ -147,7 +146,7 @@ impl Kind {
         }
     }
 
-    /// Which command takes such a file, or what else to do with it.
+    /// The command that takes such a file, or another use of it.
     fn next_step(self, path: &Path) -> String {
         let command = |words: &[&str]| {
             let path = path.to_string_lossy();
@@ -186,8 +185,8 @@ impl Kind {
     }
 }
 
-/// Says that a file is of another kind than those that are expected; no error if it is one of
-/// them, or of no kind that is known. `expected`: "an experiment file".
+/// Fails if a file is of a known kind that is not expected; passes unknown kinds. `expected`:
+/// a name, such as "an experiment file".
 pub fn expect(path: &Path, kinds: &[Kind], expected: &str) -> Result<(), String> {
     match Kind::of_path(path).filter(|kind| !kinds.contains(kind)) {
         None => Ok(()),
@@ -199,7 +198,7 @@ pub fn expect(path: &Path, kinds: &[Kind], expected: &str) -> Result<(), String>
     }
 }
 
-/// What a word of the command line is, if it names a file.
+/// The kind of a word of the command line that names a file.
 pub fn of_word(word: &str) -> Option<String> {
     let path = Path::new(word);
     let kind = Kind::of_path(path)?;

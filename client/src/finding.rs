@@ -10,12 +10,12 @@ use swarm_proto::v1::{
 
 use crate::{clock, text};
 
-/// Most workers that are listed, so that everything fits one screen.
+/// Maximum number of listed workers, so that everything fits one screen.
 pub const WORKERS_MAX: usize = 8;
 
-/// If a worker holds an item for longer, the findings suggest to look at the worker.
+/// If a worker holds an item for longer, the findings suggest checking the worker.
 const LONG_MS: u64 = 60_000;
-/// If the last items of a round are held for longer, nothing seems to happen.
+/// If the last items of a round are held for longer, the experiment counts as stalled.
 const STALL_MS: u64 = 10_000;
 
 /// One cause of an experiment's progress, or of the lack of it.
@@ -24,7 +24,7 @@ pub struct Finding {
     kind: Kind,
     /// The finding, in one sentence.
     what: String,
-    /// What the user can do; empty if nothing needs to be done.
+    /// The next steps of the user; empty if none are necessary.
     next_steps: Vec<String>,
 }
 
@@ -62,7 +62,7 @@ impl fmt::Display for Finding {
 }
 
 impl Finding {
-    /// Has its next steps name the data directory, which their commands would not find.
+    /// Adds the data directory to its next steps, whose commands would not find it.
     pub fn name_place(&mut self, data_dir: &str) {
         let lacks = |step: &&mut String| {
             step.contains(": swarmctl ")
@@ -72,7 +72,7 @@ impl Finding {
         self.next_steps.iter_mut().filter(lacks).for_each(|step| *step += &format!(" {option}"));
     }
 
-    /// Whether it is about the fleet, and so the same for all experiments.
+    /// Whether it concerns the fleet, and so is the same for all experiments.
     pub fn is_of_fleet(&self) -> bool {
         use Kind::{NoWorkers, NoWorkersAvailable, Quarantine, StoreTrouble, WorkersWaiting};
         matches!(
@@ -81,8 +81,8 @@ impl Finding {
         )
     }
 
-    /// Whether nothing of an experiment is computed because of it. `held_ms`: how long the
-    /// oldest items of its round have been with a worker.
+    /// Whether it stops the whole experiment. `held_ms`: the time since a worker got the
+    /// oldest items of its round.
     fn is_stall(&self, held_ms: u64) -> bool {
         use Kind::{
             Audits, Barrier, Incompatible, Memory, NoWorkers, NoWorkersAvailable, Paused, Queued,
@@ -91,7 +91,7 @@ impl Finding {
         match self.kind {
             Paused | Incompatible | StoreTrouble | Memory | NoWorkers | NoWorkersAvailable
             | TakenByNone | RefereeTrouble | Audits => true,
-            // Others are computed meanwhile.
+            // Other items are computed meanwhile.
             Queued => held_ms == 0,
             Barrier => held_ms >= STALL_MS,
             _ => false,
@@ -99,21 +99,21 @@ impl Finding {
     }
 }
 
-/// What keeps an experiment from being computed, if anything does.
+/// The obstacle of an experiment, if any.
 pub fn stall(answer: &ExplainExperimentResponse, address: &str) -> Option<Finding> {
     let held_ms = answer.round.as_ref().map_or(0, held_ms);
     let findings = findings(answer.experiment.as_ref()?, answer, address);
     let mut stall = findings.into_iter().find(|finding| finding.is_stall(held_ms))?;
     if stall.kind == Kind::Barrier {
-        // Its times go on; the situation is the same.
-        stall.what = "the last items of the generation take long".to_owned();
+        // Its times advance although the situation is the same.
+        stall.what = "the last items of the generation take a long time".to_owned();
         let id = answer.experiment.as_ref().map_or(0, |experiment| experiment.id);
         stall.next_steps = vec![format!("see which workers have them: swarmctl explain {id}")];
     }
     Some(stall)
 }
 
-/// What a data directory says about an experiment that has not ended. `holder`: the program that
+/// The finding about an unfinished experiment in a data directory. `holder`: the program that
 /// uses the directory.
 pub fn in_directory(experiment: &Experiment, data_dir: &Path, holder: Option<&Holder>) -> Finding {
     let address = holder.and_then(|holder| holder.address.as_deref());
@@ -160,7 +160,7 @@ pub fn findings(
         ExperimentState::Running | ExperimentState::Unspecified => {}
     }
     if !answer.incompatible.is_empty() {
-        let what = format!("it can only be computed by another version: {}", answer.incompatible);
+        let what = format!("only another version can compute it: {}", answer.incompatible);
         let steps = [
             "finish it with a coordinator of that version".to_owned(),
             format!("or cancel it and submit it again: swarmctl cancel {id}"),
@@ -170,7 +170,7 @@ pub fn findings(
     let mut findings = Vec::new();
     if !answer.store_trouble.is_empty() {
         let what = format!("the coordinator cannot store anything: {}", answer.store_trouble);
-        let steps = ["free space on its disk; it tries again by itself".to_owned()];
+        let steps = ["free space on its disk; the coordinator retries by itself".to_owned()];
         findings.push(finding(Kind::StoreTrouble, what, steps));
     }
     if !answer.shortage.is_empty() {
@@ -207,8 +207,8 @@ fn of_workers(
     if answer.workers_available == 0 && answer.workers_of_others > 0 {
         let workers = text::counted(answer.workers_of_others.into(), "worker");
         let what = format!(
-            "no worker takes it: {workers} would be free, but only for experiments of other names \
-             than {}",
+            "no worker takes it: {workers} would be free, but only for experiments with other \
+             names than {}",
             experiment.name
         );
         let steps = ["see for which: swarmctl workers --output wide".to_owned(), start];
@@ -224,7 +224,7 @@ fn of_workers(
     None
 }
 
-/// Workers that get nothing.
+/// Workers that get no items.
 fn of_withheld(answer: &ExplainExperimentResponse) -> Vec<Finding> {
     let (quarantined, waiting): (Vec<_>, Vec<_>) =
         answer.withheld.iter().partition(|worker| worker.quarantined);
@@ -239,22 +239,20 @@ fn of_withheld(answer: &ExplainExperimentResponse) -> Vec<Finding> {
         let workers = text::counted(quarantined.len() as u64, "worker");
         let what = format!("{workers} in quarantine, proved faulty:{}", list(&quarantined));
         let steps = [
-            "check the machine (memory, overheating) and the worker's program; the others go on"
+            "check the machine (memory, overheating) and the worker's program; the other workers \
+             continue"
                 .to_owned(),
-            format!(
-                "then let it in again: swarmctl workers --readmit {}",
-                quoted(&first.worker_name)
-            ),
+            format!("then readmit it: swarmctl workers --readmit {}", quoted(&first.worker_name)),
         ];
         findings.push(finding(Kind::Quarantine, what, steps));
     }
     if !waiting.is_empty() {
         let workers = text::counted(waiting.len() as u64, "worker");
-        let what = format!("{workers} given nothing for a while:{}", list(&waiting));
+        let what = format!("{workers} without items for a while:{}", list(&waiting));
         let steps = [
-            "nothing has to be done: each gets items again as its line says".to_owned(),
-            "one that has returned nothing for long hangs: read its log and restart it, which is \
-             safe"
+            "no action is needed: each worker gets items again as its line says".to_owned(),
+            "a worker that has returned nothing for a long time hangs: read its log and restart \
+             it, which is safe"
                 .to_owned(),
         ];
         findings.push(finding(Kind::WorkersWaiting, what, steps));
@@ -262,7 +260,7 @@ fn of_withheld(answer: &ExplainExperimentResponse) -> Vec<Finding> {
     findings
 }
 
-/// What the referee computes.
+/// The items that the referee computes.
 fn of_questions(answer: &ExplainExperimentResponse) -> Vec<Finding> {
     let Some(question) = answer.questions.first() else { return Vec::new() };
     let more = match answer.questions.len() {
@@ -272,13 +270,13 @@ fn of_questions(answer: &ExplainExperimentResponse) -> Vec<Finding> {
     let doubt = format!("individual {}: {}{more}", question.individual, question.doubt);
     let mut findings = vec![finding(
         Kind::Referee,
-        format!("the coordinator computes an item itself to see who is right; {doubt}"),
+        format!("the coordinator computes an item itself to find the correct result; {doubt}"),
         [],
     )];
     if let Some(question) = answer.questions.iter().find(|question| !question.trouble.is_empty()) {
         let what = format!("it cannot do so at present: {}", question.trouble);
         let steps =
-            ["mend that on the coordinator's machine; it tries again by itself, within a minute"
+            ["fix that on the coordinator's machine; the coordinator retries within a minute"
                 .to_owned()];
         findings.push(finding(Kind::RefereeTrouble, what, steps));
     }
@@ -295,14 +293,14 @@ fn of_round(
     if round.individuals_failing > 0 {
         let individuals = text::counted(round.individuals_failing.into(), "individual");
         let what = format!(
-            "workers were lost while they computed {individuals}; if one takes the coordinator's \
-             referee down as well, the experiment fails"
+            "workers were lost while they computed {individuals}; if one also crashes the \
+             coordinator's referee, the experiment fails"
         );
         let steps = [
             "find out why workers are lost: read their logs, and whether their machine is short \
              of memory"
                 .to_owned(),
-            "nothing else has to be done: their items are computed again".to_owned(),
+            "no other action is needed: other workers compute the items again".to_owned(),
         ];
         findings.push(finding(Kind::IndividualsFailing, what, steps));
     }
@@ -356,21 +354,22 @@ fn held_ms(round: &Round) -> u64 {
     round.held.iter().map(|held| held.held_ms).max().unwrap_or(0)
 }
 
-/// What to do about a batch that takes long.
+/// The next steps for a batch that takes long.
 fn look(round: &Round) -> Vec<String> {
     if held_ms(round) < LONG_MS {
         return Vec::new();
     }
     vec![
-        "long episodes can take so long; if these should not, check the workers: swarmctl workers"
+        "long episodes can take this long; if these should be shorter, check the workers: \
+         swarmctl workers"
             .into(),
         "stopping or killing a worker is safe: other workers get its items".into(),
     ]
 }
 
-/// A worker's name as one word of a shell's command.
+/// A worker's name, quoted as one word of a shell.
 fn quoted(name: &str) -> String {
-    // Only text with the character 0 cannot be one, and the coordinator sends none.
+    // Only a text with the character 0 cannot be quoted, and the coordinator sends none.
     shlex::try_quote(name).map_or_else(|_| "NAME".to_owned(), Cow::into_owned)
 }
 
@@ -386,7 +385,7 @@ fn finding(
     Finding { kind, what: what.into(), next_steps: next_steps.into_iter().collect() }
 }
 
-/// What a batch evaluates: "generation 12", or the champion after it.
+/// The subject of a batch: "generation 12", or the champion after it.
 pub fn batch_name(round: &Round) -> String {
     let generation = round.generation;
     if round.judgement {

@@ -1,4 +1,4 @@
-//! Genotypes by their addresses, as a place has them.
+//! Genotypes of a place, by their addresses.
 
 use model::{Address, Who};
 use swarm_proto::v1::{
@@ -13,7 +13,7 @@ use crate::{
     subject::Subject,
 };
 
-/// A genotype, and what it was evolved with.
+/// A genotype, and the experiment in which it evolved.
 #[derive(Debug)]
 pub struct Found {
     pub experiment: Experiment,
@@ -30,7 +30,7 @@ impl Connection {
         Ok((present(response.experiment)?, response.config_json))
     }
 
-    /// Those at an address; of a whole generation, some from an index on.
+    /// The genotypes at an address; for a whole generation, a page from an index on.
     pub async fn individuals(
         &self,
         address: Address,
@@ -48,7 +48,7 @@ impl Connection {
         self.call(async |client| client.get_lineage(request.clone()).await).await
     }
 
-    /// An address whose experiment has its number.
+    /// An address with the number of its experiment.
     pub async fn resolve(&self, address: &NamedAddress) -> Result<Address, Error> {
         Ok(address.in_experiment(match &address.experiment {
             Subject::Experiment(id) => *id,
@@ -56,11 +56,11 @@ impl Connection {
         }))
     }
 
-    /// The one at an address, and its experiment.
+    /// The genotype at an address, and its experiment.
     pub async fn genotype(&self, address: Address) -> Result<Found, Error> {
         if let Who::Generation(_) = address.who {
             return Err(Error::Input(format!(
-                "`{address}` is a whole generation; name one of it, such as {address}/0"
+                "`{address}` is a whole generation; name one individual, such as {address}/0"
             )));
         }
         let (experiment, config_json) = self.stored(address.experiment.0).await?;

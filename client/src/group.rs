@@ -1,4 +1,5 @@
-//! A change of an experiment, or of each of a group: one that fails stops no other.
+//! A change of an experiment, or of each experiment of a group: a failure does not stop
+//! the others.
 
 use swarm_proto::v1::{Experiment, ExperimentState};
 
@@ -6,24 +7,24 @@ use crate::{
     args::Target, connection::Connection, error::Error, progress::Progress, subject::Subject, text,
 };
 
-/// What became of a change.
+/// The outcome of a change.
 #[derive(Debug)]
 pub struct Outcome<T> {
-    /// Those that were changed.
+    /// The changed experiments.
     pub changed: Vec<T>,
-    /// Why some were not.
+    /// The reasons of the failures.
     failure: Option<Error>,
 }
 
 impl<T> Outcome<T> {
-    /// The error, if not all were changed. It comes after what was changed is printed.
+    /// The error if a change failed. It is printed after the changed experiments.
     pub fn end(self) -> Result<(), Error> {
         self.failure.map_or(Ok(()), Err)
     }
 }
 
-/// The experiments that a change is for: one, or those of a group whose state is such.
-/// `why_none`: the error if there are none in the group NAME.
+/// The experiments to change: one, or those of a group in the right state. `why_none`:
+/// the error if the group NAME has none.
 pub async fn members(
     target: &Target,
     connection: &Connection,
@@ -35,7 +36,7 @@ pub async fn members(
         Subject::Group(name) => name,
     };
     let mut members = connection.group(name).await?;
-    // Of one alone, the coordinator says what is wrong with its state.
+    // For a single experiment, the coordinator reports a wrong state.
     if members.len() > 1 {
         members.retain(|experiment| applies(experiment.state()));
     }
@@ -45,7 +46,8 @@ pub async fn members(
     }
 }
 
-/// Changes experiments, one after the other. Only what would stop all of them ends it early.
+/// Changes experiments, one after the other. Stops early only for an error that would repeat
+/// for all.
 pub async fn change_each<T>(
     members: &[Experiment],
     progress: &mut Progress,
@@ -58,7 +60,7 @@ pub async fn change_each<T>(
         }
         match change(experiment.id).await {
             Ok(result) => changed.push(result),
-            // It is said as it is, without a list.
+            // A single error is printed without a list.
             Err(error) if members.len() == 1 => {
                 return Outcome { changed, failure: Some(error) };
             }

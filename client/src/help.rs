@@ -1,5 +1,5 @@
-//! The pages of `--help`: commands in groups by what somebody wants to do, and the options of the
-//! connection on request alone. Manual pages and completions have all options anyway.
+//! The pages of `--help`: commands in groups by purpose, and the options of the connection on
+//! request only. Manual pages and completions always have all options.
 
 use std::{env, ffi::OsString};
 
@@ -13,13 +13,13 @@ use crate::{
     settings::CONNECTION,
 };
 
-/// The option that shows everything.
+/// The option that shows all options.
 const ALL: &str = "--help-all";
-/// Commands that work on a directory and on nothing else, or begin one: they show its option.
+/// Commands that work on a directory only, or create one: they show its option.
 const ON_A_DIRECTORY: [&str; 4] = ["backup", "doctor", "run", "web"];
 
-/// Commands for something that somebody wants to do: those of a family of requests, and those that
-/// the help has before and after them.
+/// Commands of one purpose: a family of requests, and the commands before and after it in the
+/// help.
 struct Group {
     heading: &'static str,
     before: &'static [&'static str],
@@ -68,10 +68,10 @@ impl Group {
     }
 }
 
-/// What pages of help show.
+/// The options that a page of help shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Extent {
-    /// What most people need.
+    /// The options that most people need.
     Ordinary,
     /// All options.
     Everything,
@@ -102,7 +102,7 @@ fn with_words_of_help(line: Vec<OsString>) -> Vec<OsString> {
     kept.chain([ALL.into()]).collect()
 }
 
-/// The definition of the command line, whose pages of help show so much.
+/// The definition of the command line, with these options in its pages of help.
 fn definition(extent: Extent, width: Option<usize>) -> Command {
     let mut definition = Args::command();
     if let Some(width) = width {
@@ -122,7 +122,7 @@ fn definition(extent: Extent, width: Option<usize>) -> Command {
         .after_long_help(format!("{EXAMPLES}\n\n{MORE}"))
 }
 
-/// A command, and those below it, with as many options in its help.
+/// A command and its subcommands, with these options in the help.
 fn of_extent(command: Command, extent: Extent) -> Command {
     let name = command.get_name().to_owned();
     command
@@ -130,17 +130,17 @@ fn of_extent(command: Command, extent: Extent) -> Command {
         .mut_args(|arg| shown(arg, &name, extent))
 }
 
-/// An option of a command, hidden if it is one of the connection's.
+/// An option of a command, hidden if it configures the connection.
 fn shown(arg: clap::Arg, command: &str, extent: Extent) -> clap::Arg {
     let is_subject = arg.get_id() == "data_dir" && ON_A_DIRECTORY.contains(&command);
     let is_hidden = arg.is_hide_set()
         || extent == Extent::Ordinary && arg.get_help_heading() == Some(CONNECTION) && !is_subject;
-    // A negative number is a value that an option refuses, and no option of that name.
+    // A negative number is an invalid value, not an unknown option.
     let is_value = arg.get_action().takes_values();
     arg.hide(is_hidden).allow_negative_numbers(is_value)
 }
 
-/// The definition of the command line, as it is read.
+/// The definition of the command line for parsing.
 #[cfg(test)]
 pub fn definition_for_tests() -> Command {
     definition(Extent::Ordinary, None)
@@ -151,7 +151,7 @@ fn grouped(definition: &Command, width: Option<usize>) -> String {
     let groups: Vec<(&str, Vec<String>)> =
         GROUPS.iter().map(|group| (group.heading, group.names())).collect();
     let entry = |name: &String| definition.find_subcommand(name).cloned();
-    // One list, so that all groups have columns of one width.
+    // One list, so that the columns of all groups have one width.
     let names = groups.iter().flat_map(|(_, names)| names);
     let entries = names.filter_map(entry).enumerate().map(|(i, command)| command.display_order(i));
     let mut list = Command::new("list")

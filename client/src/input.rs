@@ -1,4 +1,4 @@
-//! Reading files that somebody else may have made: never more than a file of its kind has.
+//! Reading untrusted files, up to the size limit of their kind.
 
 use std::{
     fs::File,
@@ -6,14 +6,15 @@ use std::{
     path::Path,
 };
 
-/// Most bytes of a file with a genotype, such as a champion file: more than a million genes.
+/// Size limit of a file with a genotype, such as a champion file, bytes: more than a million
+/// genes.
 pub const GENOTYPE_BYTES: usize = 32 << 20;
-/// Most bytes of a table of generations.
+/// Size limit of a table of generations, bytes.
 pub const TABLE_BYTES: usize = 256 << 20;
-/// Most bytes of the settings.
+/// Size limit of the settings, bytes.
 pub const SETTINGS_BYTES: usize = 64 << 10;
 
-/// The text of a file of at most so many bytes; `-` is standard input.
+/// The text of a file, up to a size limit in bytes; `-` is standard input.
 pub fn read_text(path: &Path, max_bytes: usize) -> io::Result<String> {
     let mut bytes = Vec::new();
     let file: Box<dyn Read> =

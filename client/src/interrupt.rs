@@ -1,5 +1,6 @@
-//! SIGINT and SIGTERM: the first requests an orderly end, the second ends at once. Where nothing
-//! waits for an orderly end, the first one ends at once. No end leaves unfinished files.
+//! SIGINT and SIGTERM: the first signal requests an orderly end, the second ends the process at
+//! once. Without code that waits for an orderly end, the first one ends the process at once.
+//! Neither leaves unfinished files.
 
 use std::{
     fs, io,
@@ -21,20 +22,20 @@ use crate::error::Error;
 
 const EXIT_INTERRUPTED: i32 = 130;
 
-/// The token, once somebody listens for signals.
+/// The token, once the program listens for signals.
 static TOKEN: OnceLock<CancellationToken> = OnceLock::new();
 /// Whether an experiment may have reached a coordinator.
 static SUBMITTED: AtomicBool = AtomicBool::new(false);
 
-/// Files and directories that are removed unless they are finished.
+/// Unfinished files and directories, to be removed.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// A file or directory that an end by a signal removes; until this is dropped.
+/// A file or directory that a signal removes, until this is dropped.
 #[derive(Debug)]
 pub struct Unfinished(PathBuf);
 
 impl Unfinished {
-    /// Makes it, and keeps it in mind before a signal can be heard.
+    /// Creates and registers it before a signal can be handled.
     pub fn make<T>(
         make: impl FnOnce() -> io::Result<T>,
         path: impl FnOnce(&T) -> &Path,
@@ -58,27 +59,29 @@ fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends the process at once, without what is unfinished. Nobody begins anything meanwhile.
+/// Ends the process at once, and removes unfinished files. The lock prevents new ones
+/// meanwhile.
 fn end() -> ! {
     let all = unfinished();
     for path in all.iter() {
-        // Whatever cannot be removed stays, as it would without this.
+        // Files that cannot be removed stay.
         let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
     }
     process::exit(EXIT_INTERRUPTED)
 }
 
-/// Has the first signal end the process as [`end`] does, unless somebody waits for an orderly end.
+/// Makes the first signal end the process like [`end`], unless code waits for an orderly end.
 fn listen_for_the_end() {
     static ONCE: Once = Once::new();
-    // Without a runtime, there is no command; one without threads hears nothing while it computes.
+    // Without a runtime, there is no command; a runtime without threads handles no signal while it
+    // computes.
     let runtime = Handle::try_current();
     let runtime =
         runtime.ok().filter(|runtime| runtime.runtime_flavor() != RuntimeFlavor::CurrentThread);
     if let (None, Some(runtime)) = (TOKEN.get(), runtime) {
         ONCE.call_once(|| {
             let _entered = runtime.enter();
-            // Where signals cannot be heard, they end the process by themselves.
+            // If signals cannot be handled, they end the process by themselves.
             if let Ok(mut signals) = Signals::listen() {
                 runtime.spawn(async move {
                     signals.next().await;
@@ -91,7 +94,7 @@ fn listen_for_the_end() {
     }
 }
 
-/// Signals that ask for an end.
+/// Signals that request an end.
 struct Signals {
     interrupt: Signal,
     terminate: Signal,
@@ -111,29 +114,29 @@ impl Signals {
     }
 }
 
-/// Whether no signal has come, for work that nothing else would end. While nobody listens for
-/// signals, they end the process.
+/// Whether no signal has come, for work that checks for interrupts itself. Until the program
+/// listens for signals, they end the process.
 pub fn goes_on() -> bool {
     TOKEN.get().is_none_or(|token| !token.is_cancelled())
 }
 
-/// An experiment is on its way to a coordinator.
+/// Remembers that an experiment is on its way to a coordinator.
 pub fn submitting() {
     SUBMITTED.store(true, Relaxed);
 }
 
-/// The error of who was interrupted.
+/// The error of an interrupted command.
 pub fn error() -> Error {
     let what = if SUBMITTED.load(Relaxed) {
-        "what was submitted continues on the coordinator"
+        "submitted experiments continue on the coordinator"
     } else {
         "nothing was submitted"
     };
     Error::Interrupted(what.into())
 }
 
-/// A token that the first signal cancels; the second ends the process, which
-/// loses nothing that is stored.
+/// A token that the first signal cancels; the second ends the process, without a loss of
+/// stored data.
 pub fn token() -> Result<CancellationToken, Error> {
     let mut signals = Signals::listen()
         .map_err(|error| Error::Internal(format!("cannot listen for signals: {error}")))?;

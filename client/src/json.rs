@@ -1,5 +1,5 @@
-//! What `--output json` prints. Numbers read back to the same bits; a fitness
-//! that is not finite is `null`.
+//! The output of `--output json`. Numbers read back to the same bits; a fitness that is
+//! not finite is `null`.
 
 mod individuals;
 
@@ -21,7 +21,7 @@ pub fn line(value: &impl Serialize) -> String {
     serde_json::to_string(value).expect("plain data with string keys serialises")
 }
 
-/// A value on several, indented lines.
+/// A value on several indented lines.
 pub fn document(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain data with string keys serialises")
 }
@@ -118,8 +118,8 @@ pub struct EndLine<'a> {
 }
 
 /// A champion without its genes. `judged`: fitness on trials that selected nothing.
-/// `selection`: on those by which it was compared with other candidates.
-/// `fitness_when_chosen`: on those of its generation, for which it became one.
+/// `selection`: on the trials that selected it among the candidates.
+/// `fitness_when_chosen`: on those of its generation, which made it a candidate.
 #[derive(Debug, Serialize)]
 struct ChampionSummary {
     judged: Option<Judged>,
@@ -216,7 +216,7 @@ pub struct ExperimentDocument<'a> {
     latest: Option<GenerationLine<'a>>,
 }
 
-/// Where a fork comes from.
+/// The origin of a fork.
 #[derive(Debug, Serialize)]
 struct Origin<'a> {
     experiment: u64,
@@ -263,7 +263,7 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
     }
 }
 
-/// The answer to a command about an experiment: the experiment; about a group: a list.
+/// The answer of a command about an experiment is the experiment; about a group, a list.
 pub fn experiments(subject: &Subject, experiments: &[Experiment]) -> String {
     let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
     match (subject, &documents[..]) {

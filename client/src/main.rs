@@ -27,7 +27,7 @@ mod help;
 mod input;
 mod interrupt;
 mod json;
-// One or the other: the same names, with and without a coordinator inside.
+// Two modules with the same names, with and without a coordinator in this program.
 #[cfg(feature = "local")]
 mod local;
 #[cfg(not(feature = "local"))]
@@ -61,14 +61,14 @@ use crate::{
     synonyms::with_suggestions,
 };
 
-/// A program, from its command line.
+/// A program, as a function of its command line.
 type Program = fn(Vec<OsString>) -> ExitCode;
 
 fn main() -> ExitCode {
     if let Some((main, words)) = other_program(env::args_os().collect()) {
         return main(words);
     }
-    // Answers a shell that asks what a command line may become, and ends then.
+    // Answers a shell's request for completions, then ends.
     CompleteEnv::with_factory(Args::command).complete();
     let args = help::matches().and_then(|matches| Args::from_arg_matches(&matches));
     let args = args.unwrap_or_else(|error| end(&with_suggestions(error)));
@@ -85,8 +85,8 @@ fn main() -> ExitCode {
     error.exit_code().into()
 }
 
-/// The program that a command line is for, if it is not `swarmctl`, and the words for it: by the
-/// name that this file is called by, or, where a file has one name only, by the first word.
+/// The program that a command line selects, unless it is `swarmctl`, and its arguments: by the
+/// name of this file, or, if the file has one name only, by the first word.
 fn other_program(words: Vec<OsString>) -> Option<(Program, Vec<OsString>)> {
     let named = |word: &OsString| PROGRAMS.iter().find(|(name, _)| *word == **name);
     let called = words.first().and_then(|word| Path::new(word).file_stem());
@@ -97,7 +97,7 @@ fn other_program(words: Vec<OsString>) -> Option<(Program, Vec<OsString>)> {
     Some((*main, words[1..].to_vec()))
 }
 
-/// Ends with what the command line gets instead of a command: an error, or help.
+/// Ends with an error of the command line, or with help.
 fn end(answer: &clap::Error) -> ! {
     let code = match answer.print() {
         Err(source) if !answer.use_stderr() => {

@@ -1,5 +1,5 @@
-//! Files that commands write: whole or not at all, and over nothing that exists unless `--force`
-//! is given.
+//! Files that commands write: whole or not at all, and replacing existing files only with
+//! `--force`.
 
 use std::{
     fs::{self, File, Metadata, Permissions},
@@ -13,23 +13,23 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 
 use crate::{error::Error, interrupt::Unfinished};
 
-/// How a file or directory is called until it is complete.
+/// The name of a file or directory until it is complete.
 const UNFINISHED: &str = ".unfinished-";
 
-/// Whether a command may write over what exists: one option in all commands that write files.
+/// Whether a command may replace existing files: one option of all commands that write files.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Args)]
 pub struct Overwrite {
-    /// Replace what exists already; without this option that is refused.
+    /// Replace an existing file or directory, instead of refusing to.
     #[arg(long)]
     pub force: bool,
 }
 
 impl Overwrite {
-    /// Replaces what the program itself has written before.
+    /// Replaces files that the program itself has written.
     pub const OWN: Self = Self { force: true };
 
-    /// Refuses a file that may not be written over, or has no place, so that nothing is computed
-    /// in vain.
+    /// Refuses a file that may not be replaced, or whose directory is missing, before a long
+    /// computation.
     pub fn check(self, path: &Path) -> Result<(), Error> {
         match parent(path) {
             parent if parent.is_dir() => self.may_replace(path),
@@ -50,18 +50,19 @@ impl Overwrite {
         }
     }
 
-    /// Begins a file, which appears when it is finished.
+    /// Begins a file, which appears only when finished.
     pub fn begin(self, path: &Path) -> Result<OutputFile, Error> {
         self.check(path)?;
         let failed = |error: io::Error| unwritable(path, &error);
         let found = fs::metadata(path).ok();
         let target = match &found {
-            // A device or a pipe has no place beside it, and keeps nothing that could be lost.
+            // A device or a pipe is written directly: it has no neighbouring file, and holds
+            // no data to lose.
             Some(found) if !found.is_file() => {
                 Target::Stream(File::options().write(true).open(path).map_err(failed)?)
             }
             _ => {
-                // What a link leads to is replaced, and not the link.
+                // Replaces the target of a link, not the link.
                 let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
                 let (file, unfinished) =
                     Unfinished::make(|| unfinished(&place, found.as_ref()), |file| file.path())
@@ -79,7 +80,7 @@ impl Overwrite {
         file.finish()
     }
 
-    /// Refuses a directory for files of these names, as [`Self::check`] a file.
+    /// Like [`Self::check`], for files of these names in a directory.
     pub fn check_files(self, to: &Path, names: &[&str]) -> Result<(), Error> {
         if fs::metadata(to).is_ok_and(|found| !found.is_dir()) {
             return Err(unwritable(to, &io::Error::other("it is a file; name a directory")));
@@ -87,7 +88,7 @@ impl Overwrite {
         names.iter().try_for_each(|name| self.may_replace(&to.join(name)))
     }
 
-    /// Begins files of a directory, which appear in it when all of them are finished.
+    /// Begins files of a directory, which appear in it only when all are finished.
     pub fn begin_files(self, to: &Path, names: &[&str]) -> Result<OutputFiles, Error> {
         self.check_files(to, names)?;
         let failed = |error: io::Error| unwritable(to, &error);
@@ -97,8 +98,7 @@ impl Overwrite {
         Ok(OutputFiles { to: to.to_owned(), directory, overwrite: self, _unfinished: unfinished })
     }
 
-    /// Has a data directory made; one that exists, and that no program uses, is replaced by it if
-    /// that is wanted.
+    /// Makes a data directory. With `--force`, it replaces an existing one that no program uses.
     pub fn data_directory<T>(
         self,
         from: &Path,
@@ -119,15 +119,15 @@ impl Overwrite {
         let (aside, unfinished) = unfinished_directory(parent(to)).map_err(failed)?;
         let [new, old] = ["new", "old"].map(|name| aside.path().join(name));
         let made = make(&new)?;
-        // From here on, the only copy of what is replaced may be there.
+        // From here on, the only copy of the replaced directory may be there.
         drop(unfinished);
         if store::is_in(&new) {
             fs::rename(to, &old).map_err(failed)?;
             if let Err(error) = fs::rename(&new, to) {
                 let Err(back) = fs::rename(&old, to) else { return Err(failed(error)) };
-                // It would be removed with the directory that it is in.
+                // Otherwise it would be removed with its parent directory.
                 let kept = aside.keep().join("old");
-                let what = format!("{back}; what was there is in {}", kept.display());
+                let what = format!("{back}; the earlier directory is in {}", kept.display());
                 return Err(failed(io::Error::other(what)));
             }
         }
@@ -145,14 +145,14 @@ pub struct OutputFile {
 
 #[derive(Debug)]
 enum Target {
-    /// A file beside its place, removed if it is not finished.
+    /// A file beside its destination, removed unless finished.
     Beside { file: NamedTempFile, place: PathBuf, unfinished: Unfinished },
-    /// What is written as it is.
+    /// A device or pipe, written directly.
     Stream(File),
 }
 
 impl OutputFile {
-    /// Puts the file where it belongs.
+    /// Moves the file to its destination.
     pub fn finish(self) -> Result<(), Error> {
         let Self { path, target, overwrite } = self;
         let (file, place, _unfinished) = match target {
@@ -168,7 +168,7 @@ impl OutputFile {
         };
         match moved.map_err(|error| error.error) {
             Ok(_) => Ok(()),
-            // Somebody else made it meanwhile.
+            // Another program created it meanwhile.
             Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(exists(&path)),
             Err(error) => Err(unwritable(&path, &error)),
         }
@@ -191,7 +191,7 @@ impl Write for OutputFile {
     }
 }
 
-/// The files of a directory while they are written; removed if they are not finished.
+/// The files of a directory while they are written; removed unless finished.
 #[derive(Debug)]
 pub struct OutputFiles {
     to: PathBuf,
@@ -201,18 +201,19 @@ pub struct OutputFiles {
 }
 
 impl OutputFiles {
-    /// Where they are while they are written.
+    /// The directory of the unfinished files.
     pub fn unfinished(&self) -> &Path {
         self.directory.path()
     }
 
-    /// Writes one of them.
+    /// Writes one file.
     pub fn write(&self, name: &str, text: &str) -> Result<(), Error> {
         fs::write(self.unfinished().join(name), text)
             .map_err(|error| unwritable(&self.to.join(name), &error))
     }
 
-    /// Puts all that were written where they belong; none if one may not be written over.
+    /// Moves all written files to their destination; none of them if one may not be
+    /// replaced.
     pub fn finish(self) -> Result<(), Error> {
         let Self { to, directory, overwrite, _unfinished } = self;
         let failed = |error: io::Error| unwritable(&to, &error);
@@ -231,7 +232,7 @@ impl OutputFiles {
     }
 }
 
-/// The error that something may not be written over.
+/// The error that a file exists.
 pub fn exists(path: &Path) -> Error {
     Error::Input(format!(
         "{} exists already; choose another name, or replace it with --force",
@@ -239,20 +240,20 @@ pub fn exists(path: &Path) -> Error {
     ))
 }
 
-/// The error that something cannot be written.
+/// The error that a file cannot be written.
 pub fn unwritable(path: &Path, error: &io::Error) -> Error {
-    // The name of a file that is unfinished says nothing to anybody.
+    // The name of an unfinished file would not help the user.
     let is_plain = error.get_ref().is_none() || error.kind() == ErrorKind::Other;
     let cause = if is_plain { error.to_string() } else { error.kind().to_string() };
     Error::Input(format!("cannot write {}: {cause}", path.display()))
 }
 
-/// The directory that something is in.
+/// The directory of a path.
 fn parent(path: &Path) -> &Path {
     path.parent().filter(|directory| !directory.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A file beside its place, with the permissions of the one that it replaces, or of any new one.
+/// A file beside its destination, with the permissions of the replaced file, or of a new one.
 fn unfinished(place: &Path, replaced: Option<&Metadata>) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
     builder.prefix(UNFINISHED);
@@ -266,7 +267,7 @@ fn unfinished(place: &Path, replaced: Option<&Metadata>) -> io::Result<NamedTemp
     Ok(file)
 }
 
-/// A directory for what is not finished.
+/// A directory for unfinished files.
 fn unfinished_directory(parent: &Path) -> io::Result<(TempDir, Unfinished)> {
     Unfinished::make(
         || Builder::new().prefix(UNFINISHED).tempdir_in(parent),
@@ -274,7 +275,7 @@ fn unfinished_directory(parent: &Path) -> io::Result<(TempDir, Unfinished)> {
     )
 }
 
-/// The permissions of a file that nobody says more of: the system takes the user's mask off.
+/// The default permissions of a file: the system applies the user's mask.
 #[cfg(unix)]
 fn anybodys() -> Option<Permissions> {
     use std::os::unix::fs::PermissionsExt as _;

@@ -1,4 +1,4 @@
-//! In which format a command prints its answer.
+//! The format in which a command prints its answer.
 
 use clap::ValueEnum;
 
@@ -8,7 +8,7 @@ pub enum OutputFormat {
     /// For people: tables fit the terminal; NO_COLOR turns colours off.
     #[value(alias = "text")]
     Table,
-    /// As table, with all columns, and nothing cut off.
+    /// Like table, but with all columns at full width.
     Wide,
     /// For programs: `run`, `watch` and `submit --watch` print one
     /// object per line, the other commands one document.

@@ -1,10 +1,10 @@
-//! How a browser is let in to pages that this process serves.
+//! Access of a browser to the pages of this process.
 
 use std::net::SocketAddr;
 
 use swarm_transport::Token;
 
-/// The address that logs a browser in. What follows `#` is not sent to anybody: a script of
+/// The address that logs a browser in. Browsers do not send the part after `#`: a script of
 /// the page reads it.
 pub fn login_address(pages: SocketAddr, token: &Token) -> String {
     format!("http://{pages}/login#{}", token.reveal())

@@ -1,4 +1,4 @@
-//! Where a command finds experiments: at a coordinator, or in a data directory.
+//! The place of experiments: a coordinator, or a data directory.
 
 use std::{
     env,
@@ -18,31 +18,31 @@ use crate::{
 
 /// The environment variable that names the data directory.
 const DATA_DIR_VARIABLE: &str = "SWARM_DATA_DIR";
-/// How long somebody who listens there has to answer.
+/// Time limit for an answer at the default address.
 const ANSWER_TIME: Duration = Duration::from_millis(300);
 
-/// What a command does with experiments.
+/// The kind of access of a command to experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Intent {
-    /// It reads them; another program may use a data directory meanwhile.
+    /// It reads experiments; another program may use the data directory meanwhile.
     Read,
-    /// It changes what is stored of them; no other program may use a data directory meanwhile.
+    /// It changes stored experiments; no other program may use the data directory meanwhile.
     Change,
-    /// It adds some; a data directory that is not there yet is made.
+    /// It adds experiments; a missing data directory is created.
     Add,
-    /// It has some go on, which in a data directory happens here.
+    /// It continues experiments; this process computes those of a data directory.
     Continue,
-    /// It adds some that are to be computed, which in a data directory happens here.
+    /// It adds experiments to compute; this process computes those of a data directory.
     Submit,
 }
 
 impl Intent {
-    /// Whether somebody has to compute afterwards.
+    /// Whether experiments must be computed afterwards.
     pub fn computes(self) -> bool {
         matches!(self, Self::Continue | Self::Submit)
     }
 
-    /// Refuses a data directory without a database, unless one is to be made.
+    /// Refuses a data directory without a database, unless it will be created.
     pub fn check(self, data_dir: &Path) -> Result<(), Error> {
         match self {
             Self::Add | Self::Submit => Ok(()),
@@ -53,19 +53,20 @@ impl Intent {
     }
 }
 
-/// Where experiments are.
+/// A place of experiments.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// At the coordinator of these settings.
     Coordinator(Settings),
-    /// In a data directory. `is_found`: nobody has named it.
+    /// In a data directory. `is_found`: the default directory, which the user has not
+    /// named.
     Directory { path: PathBuf, is_found: bool },
 }
 
 impl Place {
     /// The place that the command line names, else the environment, else the settings file; else
-    /// the coordinator at the default address if something listens there, else the default data
-    /// directory if it is there.
+    /// the coordinator at the default address if it listens, else the default data directory if
+    /// it exists.
     pub async fn find(settings: Settings) -> Result<Self, Error> {
         match Self::named(settings)? {
             Self::Coordinator(settings) if settings.coordinator.is_none() => {
@@ -78,7 +79,7 @@ impl Place {
         }
     }
 
-    /// The place that somebody has named; a coordinator without an address if nobody has.
+    /// The place that the user has named; otherwise a coordinator without an address.
     fn named(mut settings: Settings) -> Result<Self, Error> {
         let directory = settings.data_dir.take();
         let directory = directory.map(|path| Self::Directory { path, is_found: false });
@@ -99,8 +100,8 @@ impl Place {
     }
 }
 
-/// The data directory for commands that work on files alone: the one of the command line, else of
-/// the environment, else the default one.
+/// The data directory for commands that work on files only: from the command line, else the
+/// environment, else the default.
 pub fn data_dir(settings: &Settings) -> PathBuf {
     let named = settings.data_dir.clone();
     let of_environment =

@@ -30,15 +30,15 @@ use crate::{
 
 pub use beside_bar::BesideBar;
 
-/// How a notice ends that is about trials which have selected somebody.
+/// The end of a notice about fitness on trials that selected the champion.
 const OPTIMISTIC: &str = ", optimistic";
 /// Generations over which the estimate of the remaining time averages.
 const ETA_WINDOW: usize = 20;
-/// A shorter rest is not worth a word where there is no bar.
+/// Without a bar, a shorter remaining time is not reported.
 const ETA_MIN: Duration = Duration::from_secs(10);
-/// Where there is no bar, it is said so often how much of something long is done.
+/// Without a bar, the interval between reports on long work.
 const STEP_PAUSE: Duration = Duration::from_secs(10);
-/// On narrower terminals there is no bar, and no name before it: only numbers.
+/// Narrower terminals show only numbers, without a bar and a name.
 const BAR_SCREEN_WIDTH: usize = 70;
 /// Names before the bar are cut to this width.
 const NAME_WIDTH_MAX: usize = 24;
@@ -49,29 +49,29 @@ const BAR_WIDTH: usize = 26;
 pub struct Progress {
     format: OutputFormat,
     stdout: Box<dyn Write + Send>,
-    /// Why it takes no more, if it does not.
+    /// The reason why it is closed, if it is.
     unwritten: Unwritten,
-    /// What happens when the reader of standard output goes.
+    /// The reaction to a closed standard output.
     when_closed: WhenClosed,
     screen: Screen,
     /// Characters per line of remarks; none if they go to no terminal.
     remark_width: Option<usize>,
-    /// Whether remarks are left out.
+    /// Whether to leave out remarks.
     is_silent: bool,
-    /// Whether everything is said of experiments that are followed.
+    /// Whether to print everything about followed experiments.
     is_verbose: bool,
     /// Whether a bar can be shown.
     has_terminal: bool,
     /// Hidden unless an experiment is followed on a terminal.
     bar: ProgressBar,
-    /// The experiments that are followed, by their numbers.
+    /// The followed experiments, by number.
     followed: BTreeMap<u64, Followed>,
-    /// When it is said next how much is done, where there is no bar, and how much was.
+    /// Without a bar: the time of the next report, and the work done at the last one.
     next_word: Option<(Instant, u64)>,
 }
 
-/// A part of an answer for people. Colours are a table's alone: they are added when it is printed,
-/// and its cells are escaped before.
+/// A part of an answer for people. Only tables have colours, which are added on printing, after
+/// the cells are escaped.
 #[derive(Debug, Clone)]
 pub enum Part {
     /// Lines of text.
@@ -87,34 +87,34 @@ impl Part {
     }
 }
 
-/// What a command does when the reader of standard output goes, as `| head` does.
+/// The reaction of a command when the reader of standard output closes it, like `| head`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum WhenClosed {
-    /// It does its work to the end, and prints no more.
+    /// It finishes its work without printing more.
     GoOn,
-    /// It has gone; the work goes on.
+    /// The reader has gone; the work continues.
     HasGone,
-    /// It ends: it does nothing but print, for as long as an experiment takes.
+    /// It ends, because it would only print for as long as an experiment takes.
     End,
 }
 
-/// Why standard output did not take everything, if it did not.
+/// The reason why standard output is incomplete, if it is.
 #[derive(Debug, Clone, Default)]
 pub struct Unwritten(Arc<Mutex<Option<Error>>>);
 
 impl Unwritten {
-    /// The error, of a command that has succeeded but for its output.
+    /// The error of a command that has succeeded except for its output.
     pub fn end(self) -> Result<(), Error> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
 }
 
-/// What is shown of an experiment that is followed.
+/// The shown state of a followed experiment.
 struct Followed {
     /// Number of generations to do.
     generations: u64,
     done: u64,
-    /// What tells it apart from the others.
+    /// The name that distinguishes it from the others.
     label: String,
     has_ended: bool,
     /// The latest generations' durations.
@@ -122,7 +122,7 @@ struct Followed {
 }
 
 impl Followed {
-    /// Time that the rest will take if its generations are as fast as the latest ones.
+    /// Remaining time if generations stay as fast as the latest ones.
     fn remaining(&self) -> Duration {
         let n_left = if self.has_ended { 0 } else { self.generations.saturating_sub(self.done) };
         remaining(&self.durations_ms, n_left)
@@ -156,27 +156,28 @@ impl Progress {
         }
     }
 
-    /// Says everything of experiments that are followed, or what matters at once.
+    /// Sets whether to print everything about followed experiments, or only the
+    /// essential.
     pub fn with_details(self, is_verbose: bool) -> Self {
         Self { is_verbose, ..self }
     }
 
-    /// Whether everything is said of experiments that are followed.
+    /// Whether to print everything about followed experiments.
     pub fn is_verbose(&self) -> bool {
         self.is_verbose
     }
 
-    /// What is asked at the end whether standard output has taken everything.
+    /// The handle that tells at the end whether standard output is complete.
     pub fn unwritten(&self) -> Unwritten {
         self.unwritten.clone()
     }
 
-    /// Makes no remarks.
+    /// Leaves out remarks.
     pub fn silent(self) -> Self {
         Self { is_silent: true, ..self }
     }
 
-    /// Ends the command when the reader of standard output goes, instead of going on.
+    /// Ends the command, instead of continuing, when the reader of standard output goes.
     pub fn end_with_reader(&mut self) {
         self.when_closed = WhenClosed::End;
     }
@@ -202,7 +203,7 @@ impl Progress {
             OutputFormat::Table | OutputFormat::Wide if records.is_empty() => {
                 return self.print(empty);
             }
-            // Their cells are escaped; what is left are colours.
+            // Cells are already escaped; only colours remain.
             OutputFormat::Table => table.to_text(self.screen),
             OutputFormat::Wide => table.to_wide_text(self.screen),
         };
@@ -227,8 +228,8 @@ impl Progress {
         self.write(&shown.join("\n"))
     }
 
-    /// Text as it is printed: nothing in it moves the cursor or changes the direction of text,
-    /// whoever has chosen it.
+    /// Text as it is printed: it cannot move the cursor or change the direction of text, even
+    /// if its author is untrusted.
     fn shown(&self, text: &str) -> String {
         let text = escape_lines(text);
         match self.screen.width.filter(|_| self.format == OutputFormat::Table) {
@@ -246,10 +247,10 @@ impl Progress {
         match written.map_err(Error::from_stdout) {
             Err(Error::OutputClosed) if self.when_closed == WhenClosed::GoOn => {
                 self.when_closed = WhenClosed::HasGone;
-                self.remark("standard output is closed; the command goes on without it");
+                self.remark("standard output is closed; the command continues without it");
                 Ok(())
             }
-            // A full disk ends no computation; it is said at the end.
+            // A full disk ends no computation; the error comes at the end.
             Err(error) if self.when_closed == WhenClosed::GoOn => {
                 self.when_closed = WhenClosed::HasGone;
                 *self.unwritten.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
@@ -265,11 +266,11 @@ impl Progress {
             return;
         }
         let text = text::fitting(text, self.remark_width);
-        // If standard error is closed there is no place left to report to.
+        // If standard error is closed, no place for reports is left.
         let _ = self.stderr()().write_all(format!("{}\n", escape_lines(&text)).as_bytes());
     }
 
-    /// Says which place is taken if nobody has named it.
+    /// Prints the place, unless the user has named it.
     pub fn found(&self, place: &Place) {
         match place {
             Place::Directory { path, is_found: true } => self.remark(&text::found(path)),
@@ -278,7 +279,7 @@ impl Progress {
         }
     }
 
-    /// Says which certificates for the way to a coordinator expire soon.
+    /// Warns about certificates of the connection that expire soon.
     pub fn expiring(&self, settings: &Settings) {
         let now = clock::today();
         for expiry in settings.credentials.expiries().near(now) {
@@ -314,7 +315,7 @@ impl Progress {
         }
     }
 
-    /// Shows the bar, and beside it as much of a message as there is room for.
+    /// Shows the bar, and as much of a message beside it as fits.
     fn show_bar(&self, name: String, length: u64, message: &str) {
         let template = match self.screen.width {
             Some(..BAR_SCREEN_WIDTH) => "{pos}/{len}  {msg}",
@@ -322,7 +323,7 @@ impl Progress {
             _ => "{prefix} {bar:24} {pos}/{len}  {msg}",
         };
         let style = ProgressStyle::with_template(template).expect("the template is valid");
-        // One that was removed is shown again.
+        // Shows a removed bar again.
         if self.bar.is_finished() {
             self.bar.reset();
         }
@@ -330,14 +331,14 @@ impl Progress {
         self.bar.set_length(length);
         self.bar.set_prefix(name);
         self.bar.set_message(text::cut(message, self.message_room()));
-        // Another target does not know what the one before has drawn, and would draw below it.
+        // A new target would draw below the output of the previous one.
         if self.bar.is_hidden() {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
         self.bar.tick();
     }
 
-    /// Shows a generation of an experiment that is followed.
+    /// Shows a generation of a followed experiment.
     pub fn generation(
         &mut self,
         experiment_id: u64,
@@ -388,12 +389,12 @@ impl Progress {
         }
     }
 
-    /// Time until all have ended that are followed: they are computed side by side.
+    /// Time until all followed experiments have ended: they are computed side by side.
     fn remaining(&self) -> Duration {
         self.followed.values().map(Followed::remaining).max().unwrap_or_default()
     }
 
-    /// Shows how much of something long is done: in a bar, or in a line now and then.
+    /// Shows the progress of long work: in a bar, or in occasional lines.
     pub fn step(&mut self, n_done: u64, n_all: u64, what: &str) {
         if let Some(line) = self.word(clock::now(), n_done, n_all, what) {
             return self.remark(&line);
@@ -405,12 +406,12 @@ impl Progress {
         }
     }
 
-    /// What is said of a step, if there is no bar and it is time for a word.
+    /// The line about a step, if there is no bar and a report is due.
     fn word(&mut self, now: Instant, n_done: u64, n_all: u64, what: &str) -> Option<String> {
         if self.has_terminal && !self.is_json() {
             return None;
         }
-        // Whoever has done less than before has begun something else.
+        // Less progress than before means that new work has begun.
         let planned = self.next_word.filter(|&(_, n_before)| n_before <= n_done);
         let next = planned.map_or(now + waiting::SILENCE_MAX, |(next, _)| next);
         let is_due = now >= next;
@@ -418,7 +419,7 @@ impl Progress {
         is_due.then(|| format!("{n_done}/{n_all} {what}"))
     }
 
-    /// A remark about an experiment that is followed.
+    /// A remark about a followed experiment.
     pub fn notice(&self, experiment_id: u64, text: &str) {
         if !self.is_verbose && text.ends_with(OPTIMISTIC) {
             return;
@@ -431,23 +432,23 @@ impl Progress {
         }
     }
 
-    /// Says what keeps an experiment from being computed; none: nothing any more.
+    /// Reports the obstacle of an experiment; none: it has passed.
     pub fn situation(&self, experiment_id: u64, finding: Option<&Finding>) {
         let what = match finding {
             Some(finding) => format!("waiting: {finding}"),
-            None => "it is computed again".to_owned(),
+            None => "workers compute it again".to_owned(),
         };
         let first_line = what.lines().next().unwrap_or_default();
         self.set_message(&[text::cut(first_line, self.message_room())]);
         self.notice(experiment_id, &what);
     }
 
-    /// Shows as many of these beside the bar as there is room for, the first ones.
+    /// Shows the first of these texts beside the bar, as many as fit.
     fn set_message(&self, parts: &[String]) {
         self.bar.set_message(fitting(parts, self.message_room()));
     }
 
-    /// Columns beside the bar and the numbers of generations.
+    /// Free columns beside the bar and the numbers of generations.
     fn message_room(&self) -> usize {
         let Some(width) = self.screen.width else { return usize::MAX };
         let numbers = format!("{0}/{0}  ", self.bar.length().unwrap_or_default()).len();
@@ -458,7 +459,7 @@ impl Progress {
         width.saturating_sub(numbers + bar + 1)
     }
 
-    /// Counts an experiment that is followed as ended.
+    /// Counts a followed experiment as ended.
     pub fn ended(&mut self, experiment_id: u64) {
         if let Some(followed) = self.followed.get_mut(&experiment_id) {
             followed.has_ended = true;
@@ -471,7 +472,7 @@ impl Progress {
     }
 }
 
-/// As many of these as there is room for, the first ones.
+/// The first of these texts, as many as fit.
 fn fitting(parts: &[String], room: usize) -> String {
     let mut message = String::new();
     for part in parts.iter().filter(|part| !part.is_empty()) {
@@ -485,7 +486,7 @@ fn fitting(parts: &[String], room: usize) -> String {
     message
 }
 
-/// Time that `generations` more will take if they are as fast as the latest ones.
+/// Time of `generations` more generations if they are as fast as the latest ones.
 fn remaining(durations_ms: &VecDeque<u64>, generations: u64) -> Duration {
     let mean_ms = durations_ms.iter().sum::<u64>() as f64 / durations_ms.len().max(1) as f64;
     Duration::from_secs((mean_ms * generations as f64 / 1000.0).round() as u64)

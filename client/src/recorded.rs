@@ -1,4 +1,4 @@
-//! Runs as they are recorded: by a coordinator, or in files that `history` wrote.
+//! Recorded runs: of a coordinator, or in files that `history` wrote.
 
 use std::path::{Path, PathBuf};
 
@@ -17,14 +17,14 @@ use crate::{
 /// A run that the command line names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Source {
-    /// A number or a name: what the coordinator has.
+    /// A number or a name: experiments of the coordinator.
     Coordinator(Subject),
     /// Anything else: a CSV file.
     File(PathBuf),
 }
 
 impl Source {
-    /// A file whose name could be that of a group, without an ending, is reached as `./NAME`.
+    /// For a file without an extension, whose name could be that of a group, write `./NAME`.
     pub fn parse(text: &str) -> Self {
         text.parse().map_or_else(|_| Self::File(text.into()), Self::Coordinator)
     }
@@ -55,7 +55,7 @@ pub struct GenerationFitness {
     pub episodes: Option<u64>,
 }
 
-/// In files, the place of a value that is not finite is empty.
+/// In files, the cell of a value that is not finite is empty.
 fn number<'a, D: Deserializer<'a>>(value: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(value)?.unwrap_or(f64::NAN))
 }
@@ -114,12 +114,12 @@ impl Run {
                 ))
             })?;
         if !generations.is_sorted_by_key(|generation| generation.generation) {
-            return Err(problem("the generations are not those of one run, in order".into()));
+            return Err(problem("the generations must be those of one run, in order".into()));
         }
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let run = Self::new(name, path.display().to_string(), generations);
         if run.points.is_empty() {
-            return Err(problem("there is no generation with a fitness in it".into()));
+            return Err(problem("it has no generation with a fitness".into()));
         }
         Ok(run)
     }

@@ -1,9 +1,9 @@
-//! What commands have in common that send requests to a coordinator and do nothing else.
+//! The common interface of commands that only send requests to a coordinator.
 
 use crate::{connection::Connection, error::Error, place::Intent, progress::Progress};
 
-/// A command that sends requests to a coordinator and does nothing else, so that an interrupt may
-/// end it at any time; or a family of such commands.
+/// A command, or a family of commands, that only sends requests to a coordinator, so that an
+/// interrupt may end it at any time.
 pub trait Remote: Sized {
     /// Whether its answer is a table, which can be printed as CSV.
     fn has_table(&self) -> bool {
@@ -15,12 +15,12 @@ pub trait Remote: Sized {
         false
     }
 
-    /// What it does with experiments.
+    /// Its kind of access to experiments.
     fn intent(&self) -> Intent {
         Intent::Read
     }
 
-    /// Finds mistakes before anything is touched.
+    /// Finds mistakes before any effect.
     fn check(&self) -> Result<(), Error> {
         Ok(())
     }

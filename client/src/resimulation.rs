@@ -1,4 +1,4 @@
-//! Simulates again what a bundle says was simulated.
+//! Repeats the simulations of a bundle.
 
 use std::{
     ops::Range,
@@ -29,11 +29,11 @@ const TRIALS_PER_ITEM: u32 = 25;
 /// Bytes of genes in one request to a coordinator.
 const REQUEST_LEN: usize = 4 << 20;
 
-/// What works without a fleet.
+/// The alternative without a fleet.
 const HERE: &str = "without --coordinator and SWARM_COORDINATOR this command simulates in its \
                     own process";
 
-/// Where it is simulated.
+/// The place of the simulation.
 #[derive(Debug)]
 pub enum Resimulation {
     /// In this process.
@@ -44,7 +44,7 @@ pub enum Resimulation {
 
 impl Resimulation {
     /// On the fleet of the coordinator that the command line or the environment names, else
-    /// here.
+    /// in this process.
     pub fn open(
         settings: Settings,
         config_json: &str,
@@ -79,7 +79,7 @@ impl Resimulation {
     }
 }
 
-/// Has a fleet simulate.
+/// Simulates on a fleet.
 async fn fleet(
     connection: &Connection,
     config_json: &str,
@@ -108,7 +108,7 @@ fn trials(trial_set: TrialSet) -> EvolutionTrials {
             Some(Trials::Comparison(ComparisonTrials { generation, block: block.into() }))
         }
         TrialSet::Judgement(generation) => Some(Trials::Judgement(generation)),
-        // No evolution runs on these.
+        // No evolution uses these trials.
         TrialSet::Evaluation => None,
     };
     EvolutionTrials { trials }

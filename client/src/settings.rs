@@ -27,15 +27,15 @@ pub const FILE_VARIABLE: &str = "SWARM_CONFIG";
 /// The default settings file, relative to the user's configuration directory.
 const FILE: &str = "swarmevo/config.json";
 
-/// What helps where the settings cannot be used.
+/// The remedy if the settings are unusable.
 const REMEDY: &str =
     "correct it, or name another file with SWARM_CONFIG; --data-dir DIR needs none";
 
-/// Address of the coordinator and credentials, as far as they have been set.
+/// Address of the coordinator and credentials, if set.
 #[derive(Debug, Clone, Default, PartialEq, Eq, ClapArgs)]
 #[command(next_help_heading = CONNECTION)]
 pub struct Settings {
-    /// Address of the coordinator to ask [default: http://127.0.0.1:7700]
+    /// Address of the coordinator [default: http://127.0.0.1:7700]
     #[arg(
         long,
         global = true,
@@ -44,9 +44,9 @@ pub struct Settings {
         hide_env_values = true
     )]
     pub coordinator: Option<String>,
-    /// Work on the experiments in this directory, of `run` or of a coordinator, instead of asking
-    /// a coordinator [env: SWARM_DATA_DIR] [default: ./swarm-data if nothing listens at the
-    /// coordinator's default address]
+    /// Work on the experiments in this data directory of `run` or of a coordinator, instead of
+    /// connecting to a coordinator [env: SWARM_DATA_DIR] [default: ./swarm-data if nothing
+    /// listens at the coordinator's default address]
     #[arg(long, global = true, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub data_dir: Option<PathBuf>,
     /// File with the client token, if the coordinator requires one; alternatively
@@ -105,7 +105,7 @@ impl Settings {
         Ok(this.or(others))
     }
 
-    /// An empty variable is one that is not set.
+    /// An empty variable counts as unset.
     fn without_empty(self) -> Self {
         Self { coordinator: self.coordinator.filter(|url| !url.is_empty()), ..self }
     }
@@ -122,8 +122,8 @@ impl Settings {
             .map_err(|error| Error::Input(error.to_string()))
     }
 
-    /// These settings, completed from `others`. Nothing is taken from `others` if they
-    /// are about another coordinator: this one must not see its token.
+    /// These settings, completed from `others`. Ignores `others` if they name another
+    /// coordinator: this one must not see its token.
     fn or(self, others: Self) -> Self {
         if self.coordinator.is_some() && self.address() != others.address() {
             return self;

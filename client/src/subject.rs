@@ -1,4 +1,4 @@
-//! Which experiments a command is about.
+//! The experiments that a command applies to.
 
 use std::{
     fmt::{self, Display},
@@ -7,7 +7,7 @@ use std::{
 
 use model::group;
 
-/// What a command is about.
+/// The subject of a command.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Subject {
     Experiment(u64),

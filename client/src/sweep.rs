@@ -18,14 +18,15 @@ use crate::{
     interrupt, json,
 };
 
-/// Most runs of one sweep: as many as a coordinator has unfinished.
+/// Maximum number of runs of one sweep: the limit of a coordinator for unfinished
+/// experiments.
 const RUNS_MAX: usize = model::limits::UNFINISHED_MAX;
 
-/// What makes one experiment file several runs.
+/// Options that turn one experiment file into several runs.
 #[derive(Debug, Clone, Default, Args)]
 pub struct SweepArgs {
-    /// Run the experiment once with each of these seeds, as a group of runs. `0..4` are
-    /// five: both ends belong to it.
+    /// Run the experiment once with each of these seeds, as a group of runs. `0..4` means
+    /// five seeds, both ends included.
     #[arg(long, value_name = "FIRST..LAST|S,...", conflicts_with = "seed")]
     pub seeds: Option<Seeds>,
     #[command(flatten)]
@@ -81,7 +82,7 @@ impl SweepRun {
     }
 }
 
-/// All runs that the arguments ask for, or every mistake in them. One run alone belongs to
+/// All runs that the arguments request, or every mistake in them. A single run belongs to
 /// a group only if the arguments name the group or a set of seeds.
 pub fn runs(args: &ExperimentArgs) -> Result<Vec<SweepRun>, Error> {
     let file = args.file()?;
@@ -121,15 +122,15 @@ pub fn runs(args: &ExperimentArgs) -> Result<Vec<SweepRun>, Error> {
     }
     if !problems.is_empty() {
         let mut seen = BTreeSet::new();
-        // What is wrong with several variants is said once.
+        // A problem of several variants is reported once.
         problems.retain(|problem| seen.insert(problem.to_string()));
         return Err(invalid(ConfigError { problems }));
     }
     Ok(runs)
 }
 
-/// Makes a request one for a run of a group: the same run of the same group again is the
-/// run that exists.
+/// Turns a request into that of a run of a group: repeating the request returns the
+/// existing run.
 fn join(
     request: &mut SubmitExperimentRequest,
     config: &ExperimentConfig,
@@ -150,12 +151,12 @@ fn join(
 /// A combination of values.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Variant {
-    /// The changes that not all variants have; empty if there is one variant.
+    /// The changes that differ between variants; empty if there is one variant.
     name: String,
     changes: Vec<Change>,
 }
 
-/// All combinations of the values of `--set`, or what is wrong with each.
+/// All combinations of the values of `--set`, or the problems of each.
 fn variants(set: &[String], n_max: usize) -> Result<Vec<Variant>, Error> {
     let (mut axes, mut problems) = (Vec::new(), Vec::new());
     for text in set {

@@ -1,4 +1,4 @@
-//! Names of commands that people try, and the commands that do what they want.
+//! Names that people try for commands, and the matching commands.
 
 use clap::{
     CommandFactory as _, Error,
@@ -7,7 +7,7 @@ use clap::{
 
 use crate::{cli::Args, file_kind};
 
-/// Other words, and what to suggest for them.
+/// Other words, and the suggestions for them.
 const SYNONYMS: [(&[&str], &str); 10] = [
     (&["stop", "kill", "abort", "end"], "`cancel` ends an experiment"),
     (&["remove", "rm", "purge"], "`delete` deletes an experiment that has ended"),
@@ -23,11 +23,11 @@ const SYNONYMS: [(&[&str], &str); 10] = [
     (&["play", "trace", "view"], "`simulate` repeats trials, with `--trace` step by step"),
     (&["graph", "chart", "figure", "draw"], "`plot` draws the fitness of runs"),
 ];
-/// Least similarity of a command that may have been mistyped, of 1.
+/// Minimum similarity, in [0, 1], of a command that may have been mistyped.
 const SIMILARITY_MIN: f64 = 0.85;
 
-/// An error of the command line; for an unknown command with commands that were
-/// probably meant, instead of those that merely have the same letters.
+/// An error of the command line. For an unknown command, it suggests commands of the same
+/// meaning instead of similar spelling.
 pub fn with_suggestions(mut error: Error) -> Error {
     match error.kind() {
         ErrorKind::InvalidSubcommand => {}

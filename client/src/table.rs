@@ -9,11 +9,11 @@ use swarm_telemetry::escape;
 const GAP: &str = "  ";
 /// Replaces the end of a text that is cut off.
 const ELLIPSIS: &str = "…";
-/// What a spreadsheet takes for the start of a formula.
+/// Characters that begin a formula in a spreadsheet.
 const FORMULA_STARTS: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 /// Columns of text are not made narrower than this.
 const COLUMN_WIDTH_MIN: usize = 8;
-/// As long as there are columns that can be left out, columns of text keep this width.
+/// Columns of text keep this width as long as other columns can be left out.
 const TEXT_WIDTH: usize = 32;
 
 /// The terminal of standard output.
@@ -50,7 +50,7 @@ pub struct Column {
     is_number: bool,
     is_wide: bool,
     is_cuttable: bool,
-    /// Where there is no room, columns are left out, the largest first; 0: never.
+    /// If space is short, columns are left out, the largest rank first; 0: never.
     drop_rank: u8,
     paint: fn(&str) -> Style,
 }
@@ -74,7 +74,7 @@ impl Column {
         Self { is_number: true, ..Self::new(heading) }
     }
 
-    /// A column of text that may be cut where there is no room for it.
+    /// A column of text that may be cut if space is short.
     pub fn text(heading: &str) -> Self {
         Self { is_cuttable: true, ..Self::new(heading) }
     }
@@ -84,18 +84,18 @@ impl Column {
         Self { is_wide: true, ..self }
     }
 
-    /// Left out where there is no room, before those of a smaller rank.
+    /// Left out if space is short, before columns of a smaller rank.
     pub fn dropped(self, drop_rank: u8) -> Self {
         Self { drop_rank, ..self }
     }
 
-    /// Coloured by what a cell says.
+    /// Coloured by the text of the cell.
     pub fn painted(self, paint: fn(&str) -> Style) -> Self {
         Self { paint, ..self }
     }
 }
 
-/// Columns of measures: where there is no room for all, the first ones stay.
+/// Columns of measures: if space is short, the first ones stay.
 pub fn measures<'a>(names: impl IntoIterator<Item = &'a str>) -> impl Iterator<Item = Column> {
     (1..=u8::MAX)
         .chain(std::iter::repeat(u8::MAX))
@@ -120,11 +120,11 @@ impl Table {
     pub fn push(&mut self, cells: impl Into<Vec<String>>) {
         let cells = cells.into();
         debug_assert_eq!(cells.len(), self.columns.len());
-        // Names are chosen by others: nothing in them may move the cursor.
+        // Names are untrusted: they must not move the cursor.
         self.rows.push(cells.iter().map(|cell| escape(cell).into_owned()).collect());
     }
 
-    /// The default columns, with no line longer than the screen.
+    /// The default columns, within the width of the screen.
     pub fn to_text(&self, screen: Screen) -> String {
         self.render(|column| !column.is_wide, screen)
     }
@@ -165,7 +165,7 @@ impl Table {
         lines.join("\n")
     }
 
-    /// Leaves out columns as long as the others have no room on the screen.
+    /// Leaves out columns until the others fit the screen.
     fn drop_columns(&self, shown: &mut Vec<usize>, screen_width: Option<usize>) {
         let Some(screen_width) = screen_width else { return };
         let width = |i: usize| match self.columns[i].is_cuttable {
@@ -193,8 +193,8 @@ impl Table {
         cells.map(|cell| measure_text_width(cell)).max().unwrap_or(0)
     }
 
-    /// The shown columns' widths; if they are too wide for the screen together, the
-    /// widest of those that may be cut are made narrower.
+    /// The widths of the shown columns; if they exceed the screen, the widest columns
+    /// that may be cut become narrower.
     fn widths(&self, shown: &[usize], screen_width: Option<usize>) -> Vec<usize> {
         let mut widths: Vec<usize> = shown.iter().map(|&i| self.width(i)).collect();
         let gaps = GAP.len() * shown.len().saturating_sub(1);
@@ -214,8 +214,9 @@ impl Table {
 }
 
 /// Records as CSV (RFC 4180, but for the line ends), one column per key; `a.b` is the value `b` of
-/// the object `a`, in a column `a_b`. Numbers read back to the same bits; what is missing or not
-/// finite is empty. Text that a spreadsheet would take for a formula has an apostrophe before it.
+/// the object `a`, in a column `a_b`. Numbers read back to the same bits; cells of missing values,
+/// and of those that are not finite, are empty. Text that a spreadsheet would read as a formula
+/// gets an apostrophe.
 pub fn csv(keys: &[&str], records: &[impl Serialize]) -> String {
     let headings: Vec<String> = keys.iter().map(|key| key.replace('.', "_")).collect();
     let mut lines = vec![headings.join(",")];
@@ -233,7 +234,7 @@ pub fn csv(keys: &[&str], records: &[impl Serialize]) -> String {
     lines.join("\n")
 }
 
-/// A value in one cell: what an object or a list holds is separated by semicolons.
+/// A value in one cell; semicolons separate the elements of an object or a list.
 fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
@@ -247,7 +248,7 @@ fn cell(value: &Value) -> String {
     }
 }
 
-/// Text that a spreadsheet takes for text.
+/// Text that a spreadsheet does not read as a formula.
 fn without_formula(text: String) -> String {
     if text.starts_with(FORMULA_STARTS) { format!("'{text}") } else { text }
 }

@@ -6,13 +6,13 @@
 use crc32c::crc32c;
 use prost::Message;
 
-/// The first event of a file says this.
+/// The version string in the first event of a file.
 const FILE_VERSION: &str = "brain.Event:2";
 
-/// What is added to a rotated checksum, so that a checksum of data with checksums is sound.
+/// The constant added to a rotated checksum, so that a checksum over checksums is sound.
 const MASK_DELTA: u32 = 0xa282_ead8;
 
-/// `tensorflow.Event`, as far as it is used.
+/// The used part of `tensorflow.Event`.
 #[derive(Clone, PartialEq, Message)]
 struct Event {
     /// Seconds since 1970 UTC.
@@ -38,7 +38,7 @@ struct Summary {
 struct Value {
     #[prost(string, tag = "1")]
     tag: String,
-    /// Of a `oneof`, so that a zero is written, too.
+    /// Part of a `oneof`, so that a zero is written, too.
     #[prost(float, optional, tag = "2")]
     simple_value: Option<f32>,
 }

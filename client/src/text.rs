@@ -52,7 +52,7 @@ pub fn counted(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
-/// That evaluations are computed, or wait, beside experiments.
+/// The line about unfinished evaluations beside experiments.
 pub fn evaluations(number: usize) -> Option<String> {
     let what = match number {
         0 => return None,
@@ -76,7 +76,7 @@ pub fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 
-/// An event on one line: its time, its experiment, what happened.
+/// An event on one line: its time, its experiment and its text.
 pub fn log_line(experiment: &Experiment, event: &Event) -> String {
     let what = match &event.kind {
         Some(Kind::GenerationCompleted(summary)) => format!(
@@ -104,7 +104,7 @@ pub fn title(experiment: &Experiment) -> String {
     format!("experiment {} ({})", experiment.id, escape(&experiment.name))
 }
 
-/// What tells a run of a group apart: "3 seed 7 algorithm.population_size=50".
+/// The name of a run within its group: "3 seed 7 algorithm.population_size=50".
 pub fn run_label(experiment: &Experiment) -> String {
     let separator = if experiment.variant.is_empty() { "" } else { " " };
     let variant = escape(&experiment.variant);
@@ -124,13 +124,13 @@ pub fn submitted_group(name: &str, runs: &[Experiment]) -> String {
     lines.join("\n")
 }
 
-/// Says under which name an experiment was computed, if a file gives another one.
+/// The remark that an experiment was computed under another name than the file's.
 pub fn under_another_name(old: &str, name: &str) -> Option<String> {
     (old != name).then(|| format!("it was computed under the name `{}`", escape(old)))
 }
 
-/// What to say of a submission of which an identical experiment exists; `identical`: its number,
-/// 0 for none; `names`: its name, and that of the file, if both are known.
+/// The remark about a submission that is identical to an experiment; `identical`: the number of
+/// that one, 0 for none; `names`: its name and that of the file, if both are known.
 pub fn identical(
     submitted: &Experiment,
     identical: u64,
@@ -142,7 +142,7 @@ pub fn identical(
         0 => None,
         id if id == submitted.id => reuse.then(|| {
             let remark =
-                format!("experiment {id} is of the same file, seed and version, and is used again");
+                format!("experiment {id} has the same file, seed and version, and is used again");
             match (old, names) {
                 (Some(old), Some((_, name))) => format!(
                     "{remark}; {old}, and without `--reuse` it is computed under `{}`",
@@ -152,8 +152,8 @@ pub fn identical(
             }
         }),
         id => Some(format!(
-            "experiment {id} is of the same file, seed and version as experiment {}, so it has the \
-             same results; `--reuse` answers with it once it has completed{}",
+            "experiment {id} has the same file, seed and version as experiment {}, so it has the \
+             same results; `--reuse` returns that one once it has completed{}",
             submitted.id,
             old.map(|old| format!("; {old}")).unwrap_or_default()
         )),
@@ -191,8 +191,8 @@ pub fn labels(experiment: &Experiment) -> String {
     labels.collect::<Vec<_>>().join(" ")
 }
 
-/// Milliseconds that the rest of a running experiment takes if its generations go on as fast
-/// as the latest ones; none before the first.
+/// Remaining time of a running experiment, in ms, if generations stay as fast as the latest
+/// ones; none before the first.
 pub fn eta_ms(experiment: &Experiment) -> Option<u64> {
     let is_running = experiment.state() == ExperimentState::Running;
     let n_left = experiment.generations.saturating_sub(experiment.generations_done);
@@ -200,7 +200,7 @@ pub fn eta_ms(experiment: &Experiment) -> Option<u64> {
     Some((generation_ms * n_left as f64).round() as u64)
 }
 
-/// How long a running experiment takes yet, on one line.
+/// The remaining time of a running experiment, on one line.
 pub fn eta_line(experiment: &Experiment) -> Option<String> {
     let generation_ms = experiment.recent_generation_ms?;
     let left = clock::duration_ms(eta_ms(experiment)?);
@@ -208,10 +208,10 @@ pub fn eta_line(experiment: &Experiment) -> Option<String> {
         ..10_000.0 => format!("{:.2} s", generation_ms / 1000.0),
         _ => clock::duration_ms(generation_ms.round() as u64),
     };
-    Some(format!("about {left} left, if generations go on to take {each}"))
+    Some(format!("about {left} left, if generations keep taking {each}"))
 }
 
-/// Where an experiment comes from, and what is changed, if it is a fork.
+/// The parent and the changes of an experiment, if it is a fork.
 pub fn origin(experiment: &Experiment) -> Option<String> {
     let origin = experiment.forked_from.as_ref()?;
     let mut lines = vec![format!("forked from {}", origin_address(origin))];
@@ -224,7 +224,7 @@ pub fn origin_address(origin: &ForkOrigin) -> String {
     format!("{}@{}", origin.experiment_id, origin.generation)
 }
 
-/// How an experiment ended: its state, fitness, champion and digest.
+/// The outcome of an experiment: its state, fitness, champion and digest.
 pub fn end(
     experiment: &Experiment,
     first_best: Option<f64>,
@@ -240,7 +240,7 @@ pub fn end(
     }
     if let Some(champion) = champion {
         lines.push(row("champion", &champion_line(champion)));
-        // Without a judgement, there is nothing else to say what it is worth.
+        // Without a judgement, this is the only estimate of its fitness.
         if is_verbose || champion.judged.is_none() {
             lines.extend(selection_line(champion).map(|line| row("champion, optimistic", &line)));
         }
@@ -266,11 +266,11 @@ fn champion_line(champion: &GetChampionResponse) -> String {
     }
 }
 
-/// By which fitness a champion was selected, which is optimistic.
+/// The fitness that selected a champion, which is optimistic.
 fn selection_line(champion: &GetChampionResponse) -> Option<String> {
     match (&champion.held_out, champion.fitness) {
         (Some(HeldOutFitness { mean, trials, .. }), _) => {
-            Some(format!("{} on the {trials} trials by which it was selected", number(*mean, 6)))
+            Some(format!("{} on the {trials} trials that selected it", number(*mean, 6)))
         }
         (None, Some(fitness)) => Some(format!("{} in its generation", number(fitness, 6))),
         (None, None) => None,
@@ -298,8 +298,8 @@ pub fn cancelled(experiment: &Experiment) -> String {
     }
 }
 
-/// Text whose lines fit a screen, broken between words. Lines with an advice stay whole, so
-/// that its command can be copied.
+/// Text wrapped to the screen between words. Lines with advice stay whole, so that users
+/// can copy the command.
 pub fn wrapped(text: &str, width: usize) -> String {
     let wrap = |line: &str| {
         if line.trim_start().starts_with("-> ") {
@@ -320,7 +320,7 @@ pub fn fitting(text: &str, width: Option<usize>) -> String {
     width.map_or_else(|| text.to_owned(), |width| wrapped(text, width))
 }
 
-/// Says that a data directory has no workers, and who uses it.
+/// The message that a data directory has no workers, and which program uses it.
 pub fn no_fleet(data_dir: &Path, holder: Option<&Holder>) -> String {
     let data_dir = data_dir.display();
     match holder {
@@ -337,7 +337,8 @@ pub fn no_fleet(data_dir: &Path, holder: Option<&Holder>) -> String {
     }
 }
 
-/// Says that nobody computes an experiment of a data directory, and what to do.
+/// The message that no program computes an experiment of a data directory, with the next
+/// step.
 pub fn deserted(experiment: &Experiment, data_dir: &Path) -> String {
     format!(
         "{}, and no program computes it; continue it with: {}",
@@ -353,12 +354,12 @@ pub fn command_in(command: &str, id: u64, data_dir: &Path) -> String {
     shell_command(words.map(str::to_owned))
 }
 
-/// Says that a data directory is taken that nobody has named.
+/// The remark that a command uses a data directory that the user has not named.
 pub fn found(data_dir: &Path) -> String {
     format!("working on {}: nothing listens at {DEFAULT_COORDINATOR}", data_dir.display())
 }
 
-/// Text that is at most so wide.
+/// Text cut to a width.
 pub fn cut(text: &str, width: usize) -> String {
     truncate_str(text, width, "…").into_owned()
 }

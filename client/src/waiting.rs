@@ -1,5 +1,5 @@
-//! Waiting aloud: whatever a command waits for is said on standard error after two seconds,
-//! and again from time to time; and whatever it computes, likewise.
+//! Waiting aloud: after two seconds, and again from time to time, a command prints on
+//! standard error what it waits for or computes.
 
 use std::{
     pin::pin,
@@ -14,14 +14,15 @@ use tokio::time::timeout;
 
 use crate::{connection::Connection, text};
 
-/// Nothing waits for longer without a word.
+/// The longest silent wait.
 pub const SILENCE_MAX: Duration = Duration::from_secs(2);
-/// After which it is said again.
+/// The time until the message is repeated.
 pub const REMINDER: Duration = Duration::from_secs(30);
-/// How long a coordinator has to say for what it waits itself.
+/// Time limit for a coordinator's own explanation.
 const ANSWER_TIME: Duration = Duration::from_secs(1);
 
-/// Waits, and says for what: `what` follows "waiting for "; none if it ends soon.
+/// Waits, and prints the reason: `what` follows "waiting for "; none if the wait is
+/// short.
 pub async fn aloud<T>(what: impl AsyncFn() -> Option<String>, wait: impl Future<Output = T>) -> T {
     aloud_to(|line| report(&line), what, wait).await
 }
@@ -42,7 +43,7 @@ async fn aloud_to<T>(
     }
 }
 
-/// Does something that keeps this thread busy, and says what, such as "reading it".
+/// Does work that keeps this thread busy, and prints its name, such as "reading it".
 pub fn busy<T>(what: &str, work: impl FnOnce() -> T) -> T {
     busy_to(&report, SILENCE_MAX, what, work)
 }
@@ -61,7 +62,7 @@ fn busy_to<T>(
                 silence = REMINDER;
             }
         });
-        // If there is no thread for it, the work is done in silence.
+        // Without a free thread, the work is silent.
         drop(speaker);
         let done = work();
         drop(end);
@@ -69,8 +70,8 @@ fn busy_to<T>(
     })
 }
 
-/// What work of a coordinator's fleet waits for, as [`aloud`] says it. `otherwise`: what works
-/// without a fleet.
+/// The reason why work of a coordinator's fleet waits, in the words of [`aloud`]. `otherwise`:
+/// the alternative without a fleet.
 pub async fn fleet(connection: &Connection, otherwise: &str) -> String {
     let address = connection.address();
     let impatient = connection.with_patience(Duration::ZERO);
@@ -101,7 +102,7 @@ mod tests {
 
     use super::*;
 
-    /// What is said, and when, while something takes so long.
+    /// The messages of a wait, and their times.
     async fn said(seconds: u64) -> Vec<(u64, String)> {
         let start = Instant::now();
         let mut said = Vec::new();
@@ -126,7 +127,7 @@ mod tests {
         let (heard, hear) = mpsc::channel();
         let heard = Mutex::new(heard);
         let say = |line: &str| heard.lock().unwrap().send(line.to_owned()).unwrap();
-        // It ends when something has been said of it.
+        // It ends after its first message.
         let long = busy_to(&say, Duration::ZERO, "reading it", || hear.recv().unwrap());
         assert_eq!(long, "reading it");
         assert_eq!(busy_to(&say, Duration::MAX, "reading it", || 7), 7);

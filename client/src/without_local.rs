@@ -1,15 +1,16 @@
-//! In place of `local`: nothing here starts, and an error says how to get what does.
+//! Replaces `local` in a build without it: each function returns an error that names the
+//! remedy.
 
 use std::convert::Infallible;
 
 use crate::error::Error;
 
-/// The error of a command that needs what is left out.
+/// The error of a command that needs a coordinator in this process.
 fn missing() -> Error {
     Error::Input(
-        "this swarmctl has no coordinator and no workers in it, so it runs nothing itself and opens \
-         no data directory: name a coordinator with --coordinator, or install all of it with \
-         `cargo install --locked --path client`"
+        "this swarmctl was built without a coordinator and workers, so it can neither run \
+         experiments nor open a data directory: name a coordinator with --coordinator, or install \
+         the full program with `cargo install --locked --path client`"
             .into(),
     )
 }
@@ -71,7 +72,7 @@ pub mod services {
     use super::{Error, Infallible, missing};
     use crate::Program;
 
-    /// The programs that this one cannot be instead.
+    /// The other programs, which this build lacks.
     pub const PROGRAMS: [(&str, Program); 2] =
         [("coordinator", no_program), ("worker", no_program)];
 

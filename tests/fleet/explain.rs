@@ -232,7 +232,7 @@ async fn a_worker_that_was_lost_waits_for_as_long_as_is_said_and_no_longer() {
     let _worker = WorkerProcess::start(&coordinator, "flapping");
     let said = "flapping: it was lost, and has returned nothing since";
     let waiting = wait_for_finding(&coordinator, id, "workers_waiting", said);
-    assert!(step(&waiting, 0).starts_with("nothing has to be done"), "{waiting:#}");
+    assert!(step(&waiting, 0).starts_with("no action is needed"), "{waiting:#}");
     wait_for_end_of_finding(&coordinator, id, "workers_waiting");
     other.hang_up().await;
     assert_undisturbed(&coordinator, id);
@@ -315,7 +315,7 @@ async fn a_referee_that_cannot_be_started_is_asked_again_when_the_coordinator_ha
     fail(&mut broken).await;
     let trouble = wait_for_finding(&coordinator, id, "referee_trouble", "Too many open files");
     assert!(trouble["what"].as_str().unwrap().contains("processes or open files"), "{trouble:#}");
-    assert!(step(&trouble, 0).starts_with("mend that on the coordinator's machine"), "{trouble:#}");
+    assert!(step(&trouble, 0).starts_with("fix that on the coordinator's machine"), "{trouble:#}");
     limit_open_files(process, 1024);
     wait_for_end_of_finding(&coordinator, id, "referee_trouble");
     wait_for_proof(&coordinator, "broken");
@@ -345,7 +345,7 @@ async fn individuals_that_workers_were_lost_with_are_computed_again_by_themselve
     mortal.receive_assignments().await.unwrap();
     mortal.hang_up().await;
     let failing = wait_for_finding(&coordinator, id, "individuals_failing", "1 individual;");
-    assert!(step(&failing, 1).contains("nothing else has to be done"), "{failing:#}");
+    assert!(step(&failing, 1).contains("no other action is needed"), "{failing:#}");
     let nobody = wait_for_finding(&coordinator, id, "no_workers", "");
     let _worker = AdvisedWorker::start(&coordinator, step(&nobody, 0));
     wait_for_end_of_finding(&coordinator, id, "individuals_failing");
@@ -418,7 +418,7 @@ fn whoever_only_looks_is_told_at_an_interrupt_that_no_experiment_changes() {
         assert_eq!(remarks.next().unwrap(), "waiting: no worker is connected");
         let interrupt = Command::new("kill").args(["-INT", &process.id().to_string()]).status();
         assert!(interrupt.unwrap().success());
-        assert_eq!(remarks.last().unwrap(), "interrupted; this changes no experiment");
+        assert_eq!(remarks.last().unwrap(), "interrupted; this command changes no experiment");
         assert_eq!(process.wait().unwrap().code(), Some(130));
     }
 }

@@ -85,10 +85,10 @@ fn an_identical_experiment_is_named_and_answers_at_once() {
     drop(workers);
     let again = submit(&["--reuse"]);
     assert_eq!((id(&again), again.json()["state"].clone()), (1, Value::from("completed")));
-    assert!(again.stderr.contains("experiment 1 is of the same file"), "{}", again.stderr);
+    assert!(again.stderr.contains("experiment 1 has the same file"), "{}", again.stderr);
     let anew = submit(&[]);
     assert_eq!(id(&anew), 2);
-    assert!(anew.stderr.contains("`--reuse` answers with it"), "{}", anew.stderr);
+    assert!(anew.stderr.contains("`--reuse` returns that one"), "{}", anew.stderr);
     assert_eq!(id(&submit(&["--reuse", "--seed", "8"])), 3);
     assert_eq!(id(&submit(&["--reuse", "--generations", "3"])), 4);
     assert_eq!(id(&submit(&["--reuse"])), 1, "and not the one that has not ended");

@@ -1,4 +1,4 @@
-//! `swarmctl backup`: a copy of a data directory that is whole.
+//! `swarmctl backup`: a consistent copy of a data directory.
 
 use std::{
     collections::BTreeSet,
@@ -16,16 +16,15 @@ use crate::{
     waiting,
 };
 
-/// Copy a data directory, whether or not a coordinator uses it.
+/// Copy a data directory, even while a coordinator uses it.
 ///
-/// The copy is of one moment, is looked through as by `doctor`, and appears when it is
-/// complete. A coordinator started on it continues every experiment from that moment, to
-/// the same bits.
+/// The copy is a snapshot of one moment. The command checks it like `doctor`, and it
+/// appears only when complete. A coordinator on the copy continues every experiment from
+/// that moment, to the same bits.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct BackupArgs {
-    /// The copy: a directory that does not exist yet, or is empty; with --force, a data directory
-    /// that it replaces.
+    /// Directory of the copy: new or empty, or with --force a data directory to replace.
     #[arg(value_name = "TO")]
     to: PathBuf,
     #[command(flatten)]
@@ -33,9 +32,9 @@ pub struct BackupArgs {
 }
 
 const HELP: &str = "\
-Exit code 11 if something is damaged. Experiments that are damaged are named,
-and are in the copy as they are, beside all that are sound. If the database as a
-whole is damaged, there is no copy.
+Exit code 11 if something is damaged. The command names damaged experiments, and
+copies them unchanged beside the sound ones. If the database as a whole is
+damaged, there is no copy.
 
 Examples:
   swarmctl backup --data-dir ./swarm-data backups/$(date +%F)
@@ -43,13 +42,13 @@ Examples:
 
 /// Makes the copy.
 pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Result<(), Error> {
-    let what = format!("copying {} and looking through the copy", data_dir.display());
+    let what = format!("copying {} and checking the copy", data_dir.display());
     let copied = args.overwrite.data_directory(data_dir, &args.to, |to| {
         waiting::busy(&what, || store::backup(data_dir, to)).map_err(|error| refused(&error))
     });
     match copied? {
         Backup::Made(mut inspection) => {
-            // It was made beside what it has replaced.
+            // The copy was made beside the directory that it has replaced.
             inspection.path =
                 args.to.join(inspection.path.file_name().expect("a database has a name"));
             print_inspection(&inspection, progress)?;
@@ -63,7 +62,7 @@ pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Re
             }
             let damaged: Vec<String> = damaged.iter().map(ToString::to_string).collect();
             Err(Error::Damaged(format!(
-                "the copy is made, and in it these experiments are damaged, as they are in {}: {}",
+                "the copy is complete, but these experiments are damaged in it, as in {}: {}",
                 data_dir.display(),
                 damaged.join(", ")
             )))
@@ -71,7 +70,7 @@ pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Re
         Backup::Damaged(inspection) => {
             print_inspection(&inspection, progress)?;
             let database = inspection.path.display();
-            Err(Error::Damaged(format!("{database} is damaged, so that it was not copied")))
+            Err(Error::Damaged(format!("{database} is damaged, so it was not copied")))
         }
     }
 }

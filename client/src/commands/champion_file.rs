@@ -1,4 +1,5 @@
-//! The champion of what was computed in a data directory, as a file there.
+//! The file with the champion of an experiment that `run` computed, in the data
+//! directory.
 
 use std::path::{Path, PathBuf};
 
@@ -10,8 +11,8 @@ use crate::{error::Error, output_file::Overwrite};
 /// Longest part of an experiment's name in a file's name, in characters.
 const FILE_NAME_CHARS_MAX: usize = 50;
 
-/// Writes the champion to a file in the data directory; returns its path. One of before is this
-/// program's own, of the same experiment, and is replaced.
+/// Writes the champion to a file in the data directory; returns its path. Replaces an earlier
+/// champion file of the same experiment.
 pub fn write(
     data_dir: &Path,
     experiment: &Experiment,
@@ -23,7 +24,7 @@ pub fn write(
     Ok(path)
 }
 
-/// `NAME-ID.champion.json`, with nothing in it that could leave the directory.
+/// `NAME-ID.champion.json`, without characters that could lead outside the directory.
 fn champion_file_name(experiment: &Experiment) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
     let name: String = experiment
@@ -51,7 +52,7 @@ mod tests {
         assert_eq!(file_name("leader"), "leader-3.champion.json");
         assert_eq!(file_name("../a b/c"), ".._a_b_c-3.champion.json");
         assert_eq!(file_name("größe"), "größe-3.champion.json");
-        // 255 bytes is what file systems allow.
+        // File systems allow 255 bytes.
         assert!(file_name(&"𐐀".repeat(1000)).len() <= 255);
     }
 

@@ -28,12 +28,12 @@ use self::{
     samples::{Sample, Samples},
 };
 
-/// Number of last generations of each run that are averaged, unless another is wanted.
+/// Default number of last generations to average in each run.
 const LAST: u64 = 50;
 /// Points of a curve: an interval costs ten thousand draws.
 const POINTS_MAX: usize = 200;
 
-/// Compare groups of runs: how good they are, which is better, and how sure that is.
+/// Compare groups of runs: how good each is, which is better, and how certain that is.
 ///
 /// Prints, for each sample of runs, median and interquartile mean with their 95 % bootstrap
 /// intervals: of the champions' judged fitness, of the last generations, and of the time to
@@ -46,11 +46,11 @@ pub struct CompareArgs {
     /// history` wrote and champions (.json) that `swarmctl champion` or `swarmctl run` wrote.
     #[arg(required = true, value_name = "GROUP|ID|FILE", add = ArgValueCompleter::new(complete::experiments_and_files))]
     pub runs: Vec<String>,
-    /// Number of last generations of each run that are averaged; of a run that has fewer, all.
+    /// Number of last generations to average in each run; a shorter run is averaged whole.
     #[arg(long, value_name = "N", default_value_t = LAST, value_parser = clap::value_parser!(u64).range(1..))]
     pub last: u64,
     /// Also compare how many generations and episodes it takes until the mean fitness of a
-    /// generation first reaches F. A run that does not reach it counts as infinitely long.
+    /// generation first reaches F. A run that never reaches F counts as infinitely long.
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     pub target: Option<f64>,
     /// Draw the mean fitness of the generations: the interquartile mean of the runs, in a
@@ -62,23 +62,24 @@ pub struct CompareArgs {
 }
 
 const HELP: &str = "\
-Runs of a group that differ in more than the seed are a sample for each variant. Files
-NAME-SEED.csv and NAME-SEED.json are of one run, and those of one NAME are a sample.
-Champion files with other names, as those of `run`, say name and seed themselves.
-p-values are two-sided, and not corrected for the number of pairs.
+If the runs of a group differ in more than the seed, each variant is a sample.
+Files NAME-SEED.csv and NAME-SEED.json belong to one run, and all runs of one
+NAME are a sample. Champion files with other names, such as those of `run`,
+contain name and seed. p-values are two-sided, and not corrected for the number
+of pairs.
 
 Examples:
   swarmctl compare leader_selection_snes leader_selection_ga --target 1
   swarmctl compare results/{histories,champions}/leader_selection_{snes,ga}-*
   swarmctl compare sizes --to sizes.svg --output json";
 
-/// Reads the runs and compares them. The coordinator is asked only for what is in no file.
+/// Reads the runs and compares them. Asks the coordinator only about runs without a file.
 pub async fn compare(
     settings: Settings,
     args: &CompareArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    // A bad name of the figure is refused before anything is read.
+    // Refuses a bad name of the figure before reading anything.
     args.to.as_deref().map(|to| Format::check(to, args.overwrite)).transpose()?;
     if args.target.is_some_and(|target| !target.is_finite()) {
         return Err(Error::Input("--target is a finite number".into()));
@@ -121,7 +122,7 @@ pub async fn of_group(
     progress.print_parts(&Report::new(&samples, LAST, None).to_parts())
 }
 
-/// The course of the samples, as far as all runs of a sample went.
+/// The curves of the samples, each as long as its shortest run.
 fn figure(samples: &[Sample]) -> Result<Figure, Error> {
     let curves: Vec<Curve> = samples.iter().filter_map(curve).collect();
     match curves.len() {

@@ -14,8 +14,8 @@ pub struct CompletionsArgs {
 }
 
 const HELP: &str = "\
-Completions of experiments' numbers and names, too, of the coordinator of the
-environment or the settings file:
+The following script also completes numbers and names of experiments, from the
+coordinator of the environment or the settings file:
   source <(COMPLETE=bash swarmctl)                # in ~/.bashrc; also zsh, fish
 
 Examples:

@@ -1,5 +1,5 @@
-//! Commands that set experiments going, on a data directory: this process computes them, to the
-//! end, as `run` does.
+//! Commands that start experiments in a data directory: this process computes them to the end,
+//! like `run`.
 
 use std::path::Path;
 
@@ -12,7 +12,8 @@ use crate::{
     remote::Remote, text,
 };
 
-/// Executes a command with a coordinator and workers of its own, and stops them even if it fails.
+/// Executes a command with its own coordinator and workers, and stops them even if the command
+/// fails.
 pub async fn compute(
     data_dir: &Path,
     command: RemoteCommand,
@@ -40,9 +41,9 @@ fn interrupted(connection: &Connection, data_dir: &Path) -> Error {
     let resume = |id: u64| format!("\n  {}", text::command_in("resume", id, data_dir));
     let commands: String = connection.going().into_iter().map(resume).collect();
     Error::Interrupted(match &*commands {
-        "" => "nothing was set going".to_owned(),
+        "" => "no experiment was started".to_owned(),
         commands => {
-            format!("all complete generations are stored in {directory}. Continue with:{commands}")
+            format!("{directory} stores all complete generations. Continue with:{commands}")
         }
     })
 }

@@ -1,5 +1,5 @@
 //! `swarmctl pause`, `resume`, `priority` and `cancel`: commands that change the state or the
-//! share of an experiment, or of each of a group, and print what they changed.
+//! share of an experiment, or of each experiment of a group, and print the changes.
 
 use clap::Args;
 use experiment_file::limits;
@@ -40,7 +40,7 @@ family! {
 pub struct PauseArgs {
     #[command(flatten)]
     target: Target,
-    /// Reason of the pause; list and explain show it.
+    /// Reason for the pause; list and explain show it.
     #[arg(long, value_name = "TEXT")]
     reason: Option<String>,
 }
@@ -68,20 +68,19 @@ impl Remote for PauseArgs {
     }
 }
 
-/// Continue an experiment, or those of a group: a paused, failed or cancelled one, or a completed
-/// one to more generations.
+/// Continue a paused, failed or cancelled experiment, or a group, or extend a completed one.
 ///
-/// It goes on from its last stored generation, to the same bits as if it had never stopped. Of a
-/// group, those that are paused or have failed are continued; one that was cancelled is continued
-/// by its number. With --generations, completed ones are continued: generations, re-evaluations,
-/// champion and digests become those of a run that was asked for all of them at first, and the
-/// champion is judged again at the new end, on other trials. An experiment that has reached its
-/// target fitness has no more generations: `fork` goes on from it under another target.
+/// An experiment continues from its last stored generation, to the same bits as if it had never
+/// stopped. Of a group, the command continues paused and failed experiments; give the number of a
+/// cancelled one. With --generations, it extends completed experiments: generations,
+/// re-evaluations, champion and digests become those of a run that had the new length from the
+/// start, and the champion is judged again at the new end, on other trials. An experiment that
+/// has reached its target fitness cannot be extended: `fork` continues it under another target.
 #[derive(Debug, Args)]
 pub struct ResumeArgs {
     #[command(flatten)]
     target: Target,
-    /// Number of generations in all, from the first, for what has completed.
+    /// Total number of generations, from the first, to extend completed experiments.
     #[arg(long, value_name = "G", value_parser = whole(1..=limits::GENERATIONS))]
     generations: Option<u64>,
 }
@@ -117,7 +116,7 @@ async fn resume(
     follow(target, outcome, connection, progress).await
 }
 
-/// Continues what has completed, to so many generations in all.
+/// Extends completed experiments to a total number of generations.
 pub async fn extend(
     target: &Target,
     generations: u64,
@@ -136,7 +135,7 @@ pub async fn extend(
     follow(target, outcome, connection, progress).await
 }
 
-/// Change the share of the fleet of an experiment, or of each of a group.
+/// Change an experiment's share of the fleet, or that of each experiment of a group.
 ///
 /// While several experiments have items for the workers, each gets a share of the
 /// workers' time in proportion to its priority.
@@ -192,7 +191,7 @@ impl Remote for CancelArgs {
     }
 }
 
-/// Changes an experiment, or every one of a group that has not ended.
+/// Changes an experiment, or each unfinished experiment of a group.
 async fn each(
     target: &Target,
     connection: &Connection,
@@ -204,7 +203,8 @@ async fn each(
     Ok(change_each(&members, progress, change).await)
 }
 
-/// Prints what goes on; follows it to its end if this process computes it.
+/// Prints the continued experiments; follows them to their end if this process computes
+/// them.
 pub async fn follow(
     target: &Target,
     outcome: Outcome<Experiment>,
@@ -223,7 +223,8 @@ pub async fn follow(
     printed
 }
 
-/// Prints what was changed, as lines or as JSON; the error of what was not comes after it.
+/// Prints the changed experiments, as lines or as JSON, then returns the error about the
+/// others.
 pub fn print(
     target: &Target,
     outcome: Outcome<Experiment>,
@@ -233,7 +234,7 @@ pub fn print(
     print_of(target, outcome, |experiment| experiment, line, progress)
 }
 
-/// The same of what has an experiment and more.
+/// The same, for answers that contain an experiment.
 pub fn print_of<T>(
     target: &Target,
     outcome: Outcome<T>,

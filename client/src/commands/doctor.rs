@@ -1,4 +1,4 @@
-//! `swarmctl doctor`: what is wrong with a data directory, and what of it can be kept.
+//! `swarmctl doctor`: checks a data directory, and recovers its sound part.
 
 use std::path::{Path, PathBuf};
 
@@ -10,18 +10,18 @@ use swarm_telemetry::escape;
 use super::backup::refused;
 use crate::{error::Error, json, output_file::Overwrite, progress::Progress, text, waiting};
 
-/// Check the database of a data directory, or keep what is sound in a damaged one.
+/// Check the database of a data directory, or recover the sound part of a damaged one.
 ///
-/// Reads everything in it and never writes to it; a coordinator may use it meanwhile.
-/// Prints what is damaged, and for each the next step. Checked are the structure of the
+/// The command reads the whole database and never writes to it; a coordinator may use it
+/// meanwhile. It prints each damage with the next step. It checks the structure of the
 /// database, the seals of configurations, generations, checkpoints and champions, and
 /// that these continue each other.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct DoctorArgs {
-    /// Make a new data directory of everything that is sound. An experiment whose
-    /// generations are damaged and whose configuration is sound begins again there, when
-    /// it is resumed, and comes to the same bits.
+    /// Copy everything that is sound to a new data directory. An experiment with damaged
+    /// generations but a sound configuration restarts there when you resume it, and gives
+    /// the same bits.
     #[arg(long, value_name = "NEW")]
     recover: Option<PathBuf>,
     #[command(flatten)]
@@ -36,7 +36,7 @@ Examples:
   swarmctl doctor --data-dir ./swarm-data --recover ./recovered
   coordinator --data-dir ./recovered";
 
-/// What is printed of a database.
+/// The printed report on a database.
 #[derive(Debug, Serialize)]
 pub struct InspectionDocument<'a> {
     database: &'a Path,
@@ -67,10 +67,10 @@ struct RecoveredDocument<'a> {
     problems: &'a [String],
 }
 
-/// Looks at a data directory, or makes a new one of it.
+/// Checks a data directory, or recovers it into a new one.
 pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Result<(), Error> {
     if let Some(to) = &args.recover {
-        let what = format!("copying what is sound in {}", data_dir.display());
+        let what = format!("copying the sound part of {}", data_dir.display());
         let recovery = args.overwrite.data_directory(data_dir, to, |to| {
             waiting::busy(&what, || store::recover(data_dir, to)).map_err(|error| refused(&error))
         })?;
@@ -80,7 +80,7 @@ pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Re
             recovery_text(&recovery, to)
         });
     }
-    let what = format!("looking through all that is in {}", data_dir.display());
+    let what = format!("checking everything in {}", data_dir.display());
     let inspection = waiting::busy(&what, || store::inspect(data_dir))
         .map_err(|error| Error::from_store(&error))?;
     print_inspection(&inspection, progress)?;
@@ -94,7 +94,7 @@ pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Re
     }
 }
 
-/// Prints what a database is like.
+/// Prints the state of a database.
 pub fn print_inspection(inspection: &Inspection, progress: &mut Progress) -> Result<(), Error> {
     progress.print(&if progress.is_json() {
         json::document(&inspection_document(inspection))
@@ -142,7 +142,7 @@ fn recovery_text(recovery: &Recovery, to: &Path) -> String {
     let outcome = |recovered: &Recovered| {
         let what = match recovered.fate {
             Fate::Kept if recovered.problems.is_empty() => "kept",
-            Fate::Kept => "kept, but for a part",
+            Fate::Kept => "kept, except for a part",
             Fate::Restarted => "paused before its first generation",
             Fate::Lost => "lost",
         };

@@ -39,9 +39,9 @@ use self::{
 };
 use super::{run::log, simulate::genotype::Genotype};
 
-/// Most conditions that are evaluated at the same time.
+/// Maximum number of conditions that are evaluated at the same time.
 const CALLS_MAX: usize = 8;
-/// What works without a coordinator.
+/// The alternative without a coordinator.
 const HERE: &str = "with --local this command evaluates in its own process";
 
 /// Evaluates all conditions, then writes the files.
@@ -67,7 +67,7 @@ async fn evaluate_all(
     args: &EvaluateArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    // What would be in vain is refused before anything is asked for.
+    // Refuses requests that cannot succeed before sending any.
     args.overwrite.check_files(&args.to, &files::NAMES)?;
     let (file, genotype) = subject(settings.clone(), args, progress).await?;
     let remote = remote(settings, args, progress).await?;
@@ -75,7 +75,7 @@ async fn evaluate_all(
     for condition in &conditions {
         condition.check(&genotype)?;
     }
-    // An unusable directory is an error now, not after the computation.
+    // Reports an unusable directory now, not after the computation.
     let results = Results::begin(&args.to, args.overwrite)?;
     let measured = match remote {
         Some(connection) => {
@@ -100,7 +100,8 @@ async fn evaluate_all(
     progress.print_parts(&[Part::Table(table(&summary)), Part::Text(where_it_is)])
 }
 
-/// The coordinator whose fleet computes; none if that happens here, as on a data directory.
+/// The coordinator whose fleet computes; none if this process computes, as on a data
+/// directory.
 async fn remote(
     settings: Settings,
     args: &EvaluateArgs,
@@ -170,7 +171,7 @@ async fn compute_here(
     result
 }
 
-/// The error that there is no coordinator, with what works without.
+/// The error that there is no coordinator, with the alternative.
 fn or_here(error: Error) -> Error {
     match error {
         Error::Unreachable { address, reason } => {
@@ -180,7 +181,7 @@ fn or_here(error: Error) -> Error {
     }
 }
 
-/// What an evaluation waits for.
+/// The reason why an evaluation waits.
 async fn waits_for(connection: &Connection, is_local: bool) -> String {
     match is_local {
         true => "computing".to_owned(),
@@ -188,7 +189,7 @@ async fn waits_for(connection: &Connection, is_local: bool) -> String {
     }
 }
 
-/// Evaluates all conditions, some at a time; the result has their order.
+/// Evaluates all conditions, some at a time; returns the results in their order.
 async fn ask_all(
     connection: &Connection,
     conditions: &[Condition],
@@ -234,7 +235,7 @@ async fn ask_all(
     }
     Ok(measured
         .into_iter()
-        .map(|measured| measured.expect("every condition has been asked for"))
+        .map(|measured| measured.expect("every condition has been requested"))
         .collect())
 }
 

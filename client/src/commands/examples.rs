@@ -1,4 +1,4 @@
-//! `swarmctl examples`: the experiments that the program brings with it.
+//! `swarmctl examples`: the experiments that are part of the program.
 
 use clap::Args;
 use serde::Serialize;
@@ -14,7 +14,7 @@ use crate::{
 /// List the experiments that are part of this program.
 ///
 /// `run --example NAME` and `submit --example NAME` evolve one of them, without a file.
-/// `new FILE --task NAME` writes one, to change it.
+/// `new FILE --task NAME` writes a copy for you to change.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ExamplesArgs {}

@@ -28,11 +28,11 @@ struct Explanation<'a> {
     findings: &'a [Finding],
 }
 
-/// Explain what an experiment waits for, or the whole fleet, and what to do about it.
+/// Explain what an experiment or the whole fleet waits for, and the next steps.
 ///
 /// Prints on one screen what the coordinator knows: no workers, paused, queued
 /// behind other experiments, waiting at the barrier for the last items of a
-/// generation, failing items, a full disk; and for each the next steps.
+/// generation, failing items, a full disk. Each finding comes with its next steps.
 #[derive(Debug, Args)]
 pub struct ExplainArgs {
     /// Number or name of the experiment, or name of a group [default: the fleet, with all
@@ -76,7 +76,7 @@ impl Remote for ExplainArgs {
     }
 }
 
-/// What the coordinator says of an experiment, and what follows from that.
+/// The coordinator's explanation of an experiment, and the findings from it.
 async fn explain(
     connection: &Connection,
     experiment_id: u64,

@@ -28,20 +28,20 @@ use crate::{
 /// Write an ended experiment to a file that others can verify and import.
 ///
 /// The bundle is a ZIP archive, described as an RO-Crate: experiment file, seed, versions,
-/// history, the fitness of every individual in every trial, keyframes and the champion. It is
-/// what a publication needs beside the program: `swarmctl verify` computes everything in it
-/// again. The same experiment and version give the same file, byte by byte.
+/// history, the fitness of every individual in every trial, keyframes and the champion. A
+/// publication needs only this file and the program: `swarmctl verify` recomputes everything
+/// in it. The same experiment and version give the same file, byte by byte.
 ///
-/// With --tensorboard, the history so far is written for TensorBoard instead.
+/// With --tensorboard, the command writes the history so far for TensorBoard instead.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ExportArgs {
     #[command(flatten)]
     target: Target,
-    /// The bundle.
+    /// File of the bundle.
     #[arg(long, value_name = "FILE", required_unless_present = "tensorboard")]
     to: Option<PathBuf>,
-    /// Write an event file for TensorBoard into a directory of its own in this one.
+    /// Write an event file for TensorBoard, in a subdirectory of DIR.
     #[arg(long, value_name = "DIR", conflicts_with = "to")]
     tensorboard: Option<PathBuf>,
     #[command(flatten)]
@@ -102,8 +102,8 @@ async fn export(
     })
 }
 
-/// The history of an experiment as an event file, and where it belongs: TensorBoard takes each
-/// directory for a run.
+/// The history of an experiment as an event file, and its path: TensorBoard shows each
+/// directory as a run.
 async fn events(
     connection: &Connection,
     id: u64,
@@ -132,7 +132,7 @@ async fn events(
     Ok((run.join(name), file.into_bytes()))
 }
 
-/// Reads a bundle that others may have made: no more of it than one can have.
+/// Reads a bundle from an untrusted source, up to the size limit of bundles.
 pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
     let failed = |source: io::Error| Error::Input(format!("{}: {source}", path.display()));
     file_kind::expect(path, &[Kind::Bundle], "a bundle")

@@ -36,12 +36,12 @@ family! {
     }
 }
 
-/// A worker's job that ends sooner has not worked, unless its worker may be idle for less.
+/// A job that ends sooner counts as failed, unless its worker's idle timeout is shorter.
 const SHORT_LIFE: Duration = Duration::from_secs(30);
-/// So many of them, one after the other, and something is wrong with all.
+/// After so many failed jobs in a row, the command gives up.
 const SHORT_LIVES_MAX: u32 = 3;
 
-/// Keep as many workers as the experiments need, as jobs of a batch system.
+/// Run as many workers as the experiments need, as jobs of a batch system.
 #[derive(Debug, Args)]
 pub struct FleetArgs {
     #[command(subcommand)]
@@ -56,33 +56,35 @@ enum System {
 
 /// Submit and end jobs with workers in Slurm, as the coordinator's queue needs them.
 ///
-/// Runs until it is interrupted; then no more jobs are submitted, and the workers end after
-/// their --idle-timeout. One worker is wanted for 16 open items of running experiments: more
-/// after half a minute, fewer after ten minutes, as with the autoscaler for Kubernetes. A job
-/// that waits is withdrawn first; a worker that runs finishes its items. Started again, it
-/// finds its jobs by their name.
+/// The command runs until you interrupt it; it then submits no more jobs, and the workers end
+/// after their --idle-timeout. It plans one worker for 16 open items of running experiments.
+/// It adds workers half a minute after the queue grows, and removes workers ten minutes after
+/// it shrinks, like the autoscaler for Kubernetes. It withdraws waiting jobs first; a running
+/// worker finishes its items. After a restart it finds its jobs by their name.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 struct SlurmArgs {
-    /// Fewest workers.
+    /// Minimum number of workers.
     #[arg(long, value_name = "N", default_value_t = 0)]
     min: u32,
-    /// Most workers.
+    /// Maximum number of workers.
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=4096))]
     max: u32,
     /// Time after which a worker without an item ends by itself.
     #[arg(long, value_name = "TIME", default_value = "10m", value_parser = parse_positive_duration)]
     idle_timeout: Duration,
-    /// Time after which a worker has ended by itself: shorter than the job's [default: none]
+    /// Time by which a worker ends by itself, shorter than the time limit of its job
+    /// [default: none]
     #[arg(long, value_name = "TIME", value_parser = parse_positive_duration)]
     time_limit: Option<Duration>,
-    /// Time between two looks at the queues.
+    /// Time between two checks of the queues.
     #[arg(long, value_name = "TIME", default_value = "15s", value_parser = parse_positive_duration)]
     interval: Duration,
-    /// The worker's program on the nodes.
+    /// Path of the worker program on the nodes.
     #[arg(long, value_name = "PROGRAM", value_hint = ValueHint::ExecutablePath, env = "SWARM_WORKER", default_value = "worker")]
     worker: String,
-    /// Name of the jobs, of no other jobs [default: swarm-HOST-PORT of the coordinator]
+    /// Name of the jobs; no other jobs may use it [default: swarm-HOST-PORT of the
+    /// coordinator]
     #[arg(long, value_name = "NAME")]
     job_name: Option<String>,
     /// More arguments for sbatch.
@@ -91,9 +93,9 @@ struct SlurmArgs {
 }
 
 const HELP: &str = "\
-Workers take token and certificates from the environment, which sbatch passes on:
-SWARM_WORKER_TOKEN_FILE, SWARM_TLS_CA. --coordinator must be an address that the
-nodes reach. A worker has the slots of --cpus-per-task.
+Workers take token and certificates from the environment, which sbatch passes
+on: SWARM_WORKER_TOKEN_FILE, SWARM_TLS_CA. --coordinator must be an address that
+the nodes can reach. A worker has --cpus-per-task slots.
 
 Examples:
   swarmctl fleet slurm --max 40 -- --partition=short --cpus-per-task=8
@@ -123,7 +125,7 @@ impl Remote for FleetArgs {
     }
 }
 
-/// A look at the queues after which something was done, as JSON.
+/// A check of the queues that led to an action, as JSON.
 #[derive(Debug, Serialize)]
 struct Look<'a> {
     items: u64,
@@ -193,7 +195,7 @@ impl Look<'_> {
     }
 }
 
-/// Items of running experiments that wait for a worker or are with one.
+/// Items of running experiments that wait for a worker or are assigned to one.
 async fn open_items(connection: &Connection) -> Result<u64, Error> {
     let mut n_items = 0;
     for experiment in connection.running().await? {
@@ -207,10 +209,10 @@ async fn open_items(connection: &Connection) -> Result<u64, Error> {
     Ok(n_items)
 }
 
-/// The lives of jobs, to notice when none comes to anything.
+/// The lifetimes of jobs, to notice when all of them fail.
 #[derive(Debug)]
 struct Lives {
-    /// A job that ends sooner has not worked.
+    /// A job that ends sooner counts as failed.
     short: Duration,
     /// When each job was submitted, or began to run.
     since: BTreeMap<String, Instant>,
@@ -220,13 +222,13 @@ struct Lives {
 }
 
 impl Lives {
-    /// Of jobs whose workers end by themselves when they have been idle for so long.
+    /// `idle_timeout`: the time after which idle workers end by themselves.
     fn new(idle_timeout: Duration) -> Self {
         let short = SHORT_LIFE.min(idle_timeout);
         Self { short, since: BTreeMap::new(), finishing: BTreeSet::new(), n_short: 0 }
     }
 
-    /// Sees which jobs there are; an error if the last ones ended at once.
+    /// Records the present jobs; fails if the last ones ended at once.
     fn see(&mut self, now: Instant, jobs: &[Job]) -> Result<(), Error> {
         let is_there = |id: &String| jobs.iter().any(|job| job.id == *id);
         let gone: Vec<(String, Instant)> =
@@ -248,7 +250,7 @@ impl Lives {
         for job in jobs {
             match job.is_running {
                 true => drop(self.since.entry(job.id.clone()).or_insert(now)),
-                // Its life has not begun.
+                // A waiting job has no lifetime yet.
                 false => drop(self.since.insert(job.id.clone(), now)),
             }
         }

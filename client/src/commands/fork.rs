@@ -1,4 +1,4 @@
-//! `swarmctl fork`: an experiment that goes on from a generation of another one.
+//! `swarmctl fork`: an experiment that continues from a generation of another one.
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
@@ -23,30 +23,30 @@ use crate::{
 
 use super::watch;
 
-/// Continue an experiment from one of its generations as a new one, with something changed.
+/// Continue an experiment from one of its generations as a new experiment, with changes.
 ///
-/// The new experiment has the history of the other one up to that generation, and the same
-/// state after it: the next genotypes are drawn from where the other one was. Fitness, world,
-/// perturbations, the number of robots, trials or individuals and the seed may change; the
-/// algorithm, its parameters and the length of genotypes may not. What is changed is part of
-/// all further digests; a fork of which nothing is changed has those of its parent.
+/// The new experiment shares the history of its parent up to that generation, and continues
+/// from the parent's state. Fitness, world, perturbations, the number of robots, trials or
+/// individuals and the seed may change; the algorithm, its parameters and the length of
+/// genotypes may not. All later digests cover the changes; a fork without changes has the
+/// digests of its parent.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ForkArgs {
-    /// Where: ID@G or NAME@G, after generation G of an experiment.
+    /// The generation to continue after: ID@G or NAME@G, generation G of an experiment.
     #[arg(value_name = "ID@G", add = ArgValueCompleter::new(complete::experiments))]
     address: NamedAddress,
     #[command(flatten)]
     set: SetArg,
     #[command(flatten)]
     seed: SeedArg,
-    /// Number of generations, with those that are shared, instead of the parent's.
+    /// Total number of generations, including the shared ones, instead of the parent's.
     #[arg(long, value_name = "G", value_parser = whole(1..=limits::GENERATIONS))]
     generations: Option<u64>,
     /// Name of the new experiment [default: the parent's]
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-    /// Its share of the fleet relative to other experiments, 1 to 1000 [default: 100]
+    /// Share of the fleet relative to other experiments, 1 to 1000 [default: 100]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=1000))]
     priority: Option<u32>,
     /// Follow the experiment to its end, as `swarmctl watch` does.

@@ -48,8 +48,8 @@ struct Record<'a> {
 pub struct HistoryArgs {
     #[command(flatten)]
     target: Target,
-    /// Print how evolution moved instead: the step of the mean and the way so far, the genes'
-    /// standard deviations, and the rank correlation of fitness between trials.
+    /// Print the movement of evolution instead: the step of the mean and its way so far, the
+    /// genes' standard deviations, and the rank correlation of fitness between trials.
     #[arg(long)]
     dynamics: bool,
 }
@@ -59,10 +59,10 @@ Tables and CSV have one row per generation. Best, mean, min and standard
 deviation are taken over the individuals' mean fitness. CSV and JSON have every
 digit.
 
-Of --dynamics, the rank correlation (Spearman's, mean over pairs of trials) says how
-much of selection was luck: at 0, another trial ranks the individuals in an unrelated
-order. Step, way and deviations are those of a distribution; a GA has none. All is
-computed again from the fitness log.
+With --dynamics, the rank correlation (Spearman's, mean over pairs of trials)
+shows how much of selection was luck: at 0, another trial ranks the individuals
+in an unrelated order. Step, way and deviations describe a distribution; a GA
+has none. The command recomputes all of them from the fitness log.
 
 Examples:
   swarmctl history 3 | tail -1

@@ -1,4 +1,4 @@
-//! `swarmctl import`: takes an experiment of a bundle in.
+//! `swarmctl import`: imports the experiment of a bundle.
 
 use std::path::PathBuf;
 
@@ -10,11 +10,11 @@ use crate::{
     text,
 };
 
-/// Take the experiment of a bundle into a coordinator or a data directory.
+/// Import the experiment of a bundle into a coordinator or a data directory.
 ///
-/// It is listed, plotted, compared and forked like any other that has ended. Everything that
-/// follows from the fitness log is checked before anything is stored; whether the
-/// fitness is what a simulation gives, `swarmctl verify` says. To import again changes nothing.
+/// You can list, plot, compare and fork it like any other ended experiment. Before storing
+/// anything, the command checks everything that follows from the fitness log. It does not
+/// simulate the fitness again: use `swarmctl verify` for that. A second import changes nothing.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ImportArgs {

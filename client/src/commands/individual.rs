@@ -1,4 +1,4 @@
-//! `swarmctl individual`: any genotype that was ever evaluated, as JSON.
+//! `swarmctl individual`: any evaluated genotype, as JSON.
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
@@ -27,17 +27,18 @@ family! {
 /// Print a genotype and the network that it encodes, as JSON: the champion, or any
 /// individual of any generation.
 ///
-/// Individuals are computed again from the fitness that evolution was told, to the same
-/// bits; nothing is simulated. Of a champion, `judged` says what it is worth: the mean, with
+/// The command recomputes individuals from the stored fitness, to the same bits, without
+/// simulating. For a champion, `judged` is the fair estimate of its fitness: the mean, with
 /// its 95 % interval, on trials that selected nothing, once the run has ended. `selection` is
-/// the mean on the held-out trials by which it was compared with other candidates, and
-/// `fitness_when_chosen` that of its generation, for which it became one: both are optimistic.
+/// the mean on the held-out trials that selected it among the candidates, and
+/// `fitness_when_chosen` the mean in its generation, which made it a candidate: both are
+/// optimistic.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct IndividualArgs {
-    /// Whom: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation G;
-    /// ID@G/mean, the mean of the distribution after generation G; ID@G, all individuals
-    /// of generation G, without their networks.
+    /// The genotype: ID or NAME, the champion of an experiment; ID@G/I, individual I of
+    /// generation G; ID@G/mean, the mean of the distribution after generation G; ID@G, all
+    /// individuals of generation G, without their networks.
     #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments))]
     address: NamedAddress,
 }
@@ -77,7 +78,7 @@ async fn document(address: &NamedAddress, connection: &Connection) -> Result<Str
     })
 }
 
-/// A champion as `individual` prints it and `run` stores it.
+/// A champion in the format that `individual` prints and `run` stores.
 pub fn champion_document(
     experiment: &Experiment,
     champion: &GetChampionResponse,

@@ -1,5 +1,5 @@
-//! `swarmctl get`, `delete`, `prune`, `archive` and `label`: what is kept of experiments, and
-//! what they are found by.
+//! `swarmctl get`, `delete`, `prune`, `archive` and `label`: stored experiments, and the
+//! labels that find them.
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
@@ -29,7 +29,7 @@ use crate::{
 };
 
 family! {
-    /// Commands for what is kept of experiments.
+    /// Commands for stored experiments.
     Keep {
         Get(GetArgs),
         Label(LabelArgs),
@@ -41,14 +41,14 @@ family! {
     }
 }
 
-/// Why a command for what has ended applies to none of a group.
+/// Why a command for ended experiments applies to none of a group.
 const NONE_HAS_ENDED: &str = "no experiment of group `NAME` has ended";
 
-/// Delete an experiment that has ended, or those of a group, with all that is stored of it.
+/// Delete an ended experiment, or those of a group, with all their data.
 ///
-/// There is no way back but a backup. Its number is not used again, forks of it stay. The room
-/// in the database is used again; the file does not get shorter, a backup is. `prune` deletes
-/// less, `archive` nothing.
+/// Only a backup can restore it. Its number is not used again, and its forks stay. The
+/// database reuses the freed space: its file keeps its size, but backups get smaller. `prune`
+/// deletes less, `archive` nothing.
 #[derive(Debug, Args)]
 pub struct DeleteArgs {
     #[command(flatten)]
@@ -81,11 +81,11 @@ impl Remote for DeleteArgs {
     }
 }
 
-/// Delete the fitness log of an experiment that has ended, or of those of a group.
+/// Delete the fitness log of an ended experiment, or of those of a group.
 ///
-/// Its individuals cannot be brought back any more. History, champion and digests stay, and
-/// more generations can be asked for as before. The room in the database is used again; a
-/// backup is shorter.
+/// Its individuals cannot be recovered afterwards. History, champion and digests stay, and
+/// `resume --generations` still works. The database reuses the freed space; backups get
+/// smaller.
 #[derive(Debug, Args)]
 pub struct PruneArgs {
     #[command(flatten)]
@@ -118,10 +118,10 @@ impl Remote for PruneArgs {
     }
 }
 
-/// Archive an experiment that has ended, or those of a group: `list` leaves it out.
+/// Archive an ended experiment, or those of a group, so that `list` leaves it out.
 ///
-/// Nothing is deleted, and every command still takes it; `list --all` has it. An experiment
-/// that goes on leaves the archive.
+/// Archiving deletes nothing: every command still accepts the experiment, and `list --all`
+/// shows it. An experiment that you resume leaves the archive.
 #[derive(Debug, Args)]
 pub struct ArchiveArgs {
     #[command(flatten)]
@@ -153,13 +153,13 @@ impl Remote for ArchiveArgs {
     }
 }
 
-/// Label an experiment, or all of a group, to find it by: `list --label KEY=VALUE`.
+/// Label an experiment, or all of a group, so that `list --label KEY=VALUE` finds it.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct LabelArgs {
     #[command(flatten)]
     target: Target,
-    /// Labels to add, or to give another value.
+    /// Labels to add or to change.
     #[arg(value_name = "KEY=VALUE", add = ArgValueCompleter::new(complete::labels), required_unless_present = "remove")]
     labels: Vec<Label>,
     /// Keys of labels to remove.
@@ -197,13 +197,14 @@ impl Remote for LabelArgs {
     }
 }
 
-/// A fork before the experiment that it shares generations with, which is kept until then.
+/// Forks come before their parents: a parent stays as long as a fork shares its
+/// generations.
 fn latest_first(mut members: Vec<Experiment>) -> Vec<Experiment> {
     members.sort_by_key(|experiment| std::cmp::Reverse(experiment.id));
     members
 }
 
-/// Prints experiments, each with what became of so many bytes.
+/// Prints experiments, each with the freed or remaining bytes.
 fn print_with(
     target: &Target,
     outcome: Outcome<(Experiment, u64)>,
@@ -222,8 +223,8 @@ fn mib(bytes: u64) -> String {
 
 /// Print the experiment file of an experiment.
 ///
-/// It is in canonical form: every key that has an effect, the seed included. Submitted again,
-/// it gives the same bits.
+/// The file is in canonical form: every key that has an effect, including the seed. If you
+/// submit it again, it gives the same bits.
 #[derive(Debug, Args)]
 #[command(after_help = GET_HELP)]
 pub struct GetArgs {

@@ -1,4 +1,4 @@
-//! `swarmctl lineage`: whom an individual descends from.
+//! `swarmctl lineage`: the ancestors of an individual.
 
 mod draw;
 
@@ -13,17 +13,17 @@ use crate::{
     progress::Progress, remote::Remote,
 };
 
-/// Print whom an individual of a genetic algorithm descends from, and which genes it has from
-/// whom.
+/// Print the ancestors of an individual of a genetic algorithm, and the genes inherited from
+/// each.
 ///
-/// Nothing of this is stored: the generations are gone through again from the fitness log. A
-/// gene is from a parent that has the very same one; the others mutated, or blend both
-/// parents. Of each ancestor, `genes` is how many of the individual's genes have come down from
-/// it unchanged.
+/// The command recomputes the generations from the fitness log. A gene is inherited if a parent
+/// has exactly the same value; all other genes mutated, or blend both parents. `genes` is the
+/// number of the individual's genes that descend unchanged from an ancestor.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct LineageArgs {
-    /// Whom: ID@G/I, individual I of generation G of the experiment of that number or name.
+    /// The individual: ID@G/I, individual I of generation G of the experiment with that
+    /// number or name.
     #[arg(value_name = "ID@G/I", add = ArgValueCompleter::new(complete::experiments))]
     address: NamedAddress,
     /// Number of generations to go back.
@@ -82,7 +82,7 @@ impl Remote for LineageArgs {
     }
 }
 
-/// What was done to make an individual; none in the earliest generation of a lineage.
+/// The operators that made an individual; none in the earliest generation of a lineage.
 fn operator(ancestor: &Ancestor) -> Option<&'static str> {
     match ancestor.operator() {
         BirthOperator::Unspecified => None,

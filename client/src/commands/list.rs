@@ -55,10 +55,11 @@ const CSV_KEYS: [&str; 28] = [
 
 /// List all experiments, or those of a group.
 ///
-/// `judged` is the mean fitness of the champion on trials that selected nothing, once the
-/// run has ended; `selection` that on the held-out trials by which it was selected, which
-/// is optimistic. `best` and `mean` are those of the latest generation. `eta` is the time that
-/// the generations left take if they are as fast as the latest ones. A narrow terminal shows fewer columns, `--output wide` all.
+/// `judged` is the champion's mean fitness on trials that selected nothing, known once the run has
+/// ended. `selection` is its mean on the held-out trials that selected it, which is optimistic.
+/// `best` and `mean` describe the latest generation. `eta` is the remaining time if generations
+/// stay as fast as the latest ones. A narrow terminal shows fewer columns; `--output wide` shows
+/// all.
 #[derive(Debug, Args)]
 #[command(visible_alias = "ls", after_help = HELP)]
 pub struct ListArgs {
@@ -84,7 +85,7 @@ impl Remote for ListArgs {
         if let Some(group) = &self.group
             && experiments.is_empty()
         {
-            // Says so if there is no such name.
+            // Fails if the name does not exist.
             connection.group(group).await?;
         }
         self.filter.sort(&mut experiments);
@@ -102,7 +103,7 @@ impl Remote for ListArgs {
 fn table(experiments: &[Experiment], now_ms: u64) -> Table {
     let fitness =
         |fitness: Option<f64>| fitness.map_or("-".into(), |fitness| text::number(fitness, 3));
-    // Where nobody has groups, there is nothing to show of them.
+    // Columns without any value are shown with `--output wide` only.
     let shown_if = |is_used: bool, column: Column| if is_used { column } else { column.wide() };
     let has_groups = experiments.iter().any(|experiment| !experiment.group.is_empty());
     let has_labels = experiments.iter().any(|experiment| !experiment.labels.is_empty());

@@ -1,10 +1,10 @@
-//! Commands that look at experiments.
+//! Commands that show experiments.
 
 use super::{explain, history, list, watch};
 use crate::remote::family;
 
 family! {
-    /// Looks at experiments.
+    /// Commands that show experiments.
     Look {
         List(list::ListArgs),
         Watch(watch::WatchArgs),

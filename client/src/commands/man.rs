@@ -15,7 +15,7 @@ use crate::{
 #[derive(Debug, ClapArgs)]
 #[command(after_help = HELP)]
 pub struct ManArgs {
-    /// The directory; created if it does not exist.
+    /// The directory, created if missing.
     pub directory: PathBuf,
     #[command(flatten)]
     pub overwrite: Overwrite,

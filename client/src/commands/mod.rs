@@ -1,5 +1,5 @@
-//! The commands: their arguments with their help, their requests and their output. Those that
-//! are requests to a coordinator are declared in families, at the top of a file each.
+//! The commands: their arguments with their help, their requests and their output. Commands
+//! that send requests to a coordinator are declared in families, each at the top of a file.
 
 mod backup;
 mod bench;
@@ -53,7 +53,7 @@ use crate::{
     remote::{Remote, family},
 };
 
-/// The commands, in the order of the help.
+/// All commands, in the order of the help.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Run(run::RunArgs),
@@ -84,7 +84,7 @@ pub enum Command {
 }
 
 family! {
-    /// The commands that are requests to a coordinator, by what somebody wants to do.
+    /// The commands that send requests to a coordinator, by purpose.
     RemoteCommand {
         #[command(flatten)]
         Evolve(submit::Evolve),
@@ -118,7 +118,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         progress.end_with_reader();
     }
     let command = match command {
-        // An interrupt ends these at once, and removes the files that they have begun.
+        // An interrupt ends these commands at once, and removes their unfinished files.
         Command::Validate(args) => return validate::validate(&args, &mut progress),
         Command::New(args) => return new::new(&args, &mut progress),
         Command::Examples(_) => return examples::examples(&mut progress),
@@ -142,7 +142,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Referee => {
             return serve_referee();
         }
-        // These start a coordinator and workers, and stop them when interrupted.
+        // These commands start a coordinator and workers, and stop them when interrupted.
         Command::Run(args) => {
             return run::run(settings, &args, progress, interrupt::token()?).await;
         }
@@ -180,11 +180,11 @@ async fn ask(
     let result = tokio::select! {
         biased;
         () = interrupt.cancelled() => Err(match intent {
-            Intent::Read => Error::Interrupted("this changes no experiment".into()),
+            Intent::Read => Error::Interrupted("this command changes no experiment".into()),
             Intent::Submit | Intent::Continue if connection.data_dir().is_none() => {
                 interrupt::error()
             }
-            _ => Error::Interrupted("nothing is changed that was not printed".into()),
+            _ => Error::Interrupted("every change was printed".into()),
         }),
         result = command.execute(&connection, progress) => result,
     };

@@ -1,4 +1,4 @@
-//! `swarmctl new`: an experiment of one's own, begun from one that evolves.
+//! `swarmctl new`: an experiment of the user's own, copied from an example.
 
 use std::path::{Path, PathBuf};
 
@@ -14,17 +14,17 @@ use crate::{
     progress::Progress,
 };
 
-/// Write an experiment file to begin with, and the script of its task.
+/// Write a first experiment file and the script of its task.
 ///
-/// NAME.json evolves as it is; NAME.star says what good is, in a language that looks like
-/// Python. Change either, and ask `swarmctl validate` what it makes of the change.
+/// NAME.json evolves without changes. NAME.star defines the fitness, in a language that
+/// looks like Python. After you change either file, check it with `swarmctl validate`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct NewArgs {
     /// Name of the experiment, and of its files in this directory: letters, digits, - and _.
     #[arg(value_parser = name)]
     name: String,
-    /// The task to begin with.
+    /// The task to start from.
     #[arg(long, value_name = "EXAMPLE", default_value = "dispersion", value_parser = examples::parser())]
     task: &'static Example,
     #[command(flatten)]
@@ -36,15 +36,15 @@ Examples:
   swarmctl new spread
   swarmctl new hunters --task predator";
 
-/// What the parts of an experiment file are.
+/// The comments on the parts of an experiment file.
 const PARTS: [(&str, &str); 4] = [
-    ("task", "What good is: the functions of this script."),
-    ("topology", "The network that every robot has a copy of, from stimuli to outputs."),
-    ("algorithm", "What evolves, and how: more generations or individuals take longer."),
-    ("world", "The arena: who is in it, where they start, what they sense and do."),
+    ("task", "The fitness: the functions of this script."),
+    ("topology", "The network of every robot, from stimuli to outputs."),
+    ("algorithm", "The algorithm: more generations or individuals take longer."),
+    ("world", "The arena: its objects, their positions, sensors and actuators."),
 ];
 
-/// A name that files can have, and that commands take for an experiment.
+/// A name that is valid for files and for experiments.
 fn name(text: &str) -> Result<String, String> {
     match group::check_name(text) {
         Ok(()) if !text.is_empty() && !text.starts_with('-') => Ok(text.to_owned()),
@@ -53,7 +53,7 @@ fn name(text: &str) -> Result<String, String> {
 }
 
 impl Example {
-    /// The experiment file under another name, with comments that say what is where.
+    /// The experiment file under another name, with a comment for each part.
     fn config_named(&self, name: &str) -> String {
         let mut lines = vec![
             format!("// {}.", self.about),
@@ -78,15 +78,15 @@ impl Example {
         )
     }
 
-    /// The script, with a comment below the line that says what it is about.
+    /// The script, with a comment below its first line.
     fn script_to_change(&self) -> Option<String> {
         let (first, rest) = self.script?.split_once('\n')?;
-        let hint = "# All that a script sees, and the functions that it may have: docs/tasks.md";
+        let hint = "# docs/tasks.md lists the values and functions of scripts.";
         Some(format!("{first}\n\n{hint}\n{rest}"))
     }
 }
 
-/// What was written.
+/// The written files.
 #[derive(Debug, Serialize)]
 struct Written<'a> {
     name: &'a str,
@@ -186,7 +186,8 @@ mod tests {
             assert_eq!(compiled.config.name, own);
             let of_script = compiled.config.task.as_ref().map(|task| task.script.name.clone());
             assert_eq!(of_script, template.script.map(|_| format!("{own}.star")));
-            // A generation of the thesis's experiments takes as long as a whole run of others.
+            // A generation of the thesis's experiments takes as long as a whole run of other
+            // experiments.
             if compiled.config.algorithm.generations <= 120 {
                 assert_eq!(means(directory.path(), &own, 1).await.len(), 1);
             }

@@ -1,4 +1,5 @@
-//! Words of earlier releases for what `resume` and `watch` do. No help shows them.
+//! Commands of earlier releases that `resume` and `watch` have replaced. No help shows
+//! them.
 
 use std::time::Duration;
 
@@ -28,7 +29,7 @@ use crate::{
 };
 
 family! {
-    /// Words of earlier releases.
+    /// Commands of earlier releases.
     OldWords {
         #[command(hide = true)]
         Extend(ExtendArgs),
@@ -41,7 +42,7 @@ family! {
     }
 }
 
-/// As `resume --generations`.
+/// Like `resume --generations`.
 #[derive(Debug, Args)]
 pub struct ExtendArgs {
     #[command(flatten)]
@@ -61,7 +62,7 @@ impl Remote for ExtendArgs {
     }
 }
 
-/// As `resume`, for what has failed and nothing else.
+/// Like `resume`, for failed experiments only.
 #[derive(Debug, Args)]
 pub struct RetryArgs {
     #[command(flatten)]
@@ -87,7 +88,7 @@ impl Remote for RetryArgs {
     }
 }
 
-/// As `watch --quiet`.
+/// Like `watch --quiet`.
 #[derive(Debug, Args)]
 pub struct WaitArgs {
     #[command(flatten)]
@@ -107,7 +108,7 @@ impl Remote for WaitArgs {
     }
 }
 
-/// As `watch --events --so-far`, or without --so-far.
+/// Like `watch --events --so-far`, or without --so-far.
 #[derive(Debug, Args)]
 pub struct LogsArgs {
     /// Number or name of the experiment, or name of a group [default: all, in the order of

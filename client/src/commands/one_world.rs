@@ -1,4 +1,5 @@
-//! Every command gives the same on a data directory as on a coordinator with the same database.
+//! Every command prints the same on a data directory as on a coordinator with the same
+//! database.
 
 use std::{
     collections::BTreeSet,
@@ -16,11 +17,11 @@ use worker::WorkerConfig;
 use super::execute;
 use crate::{cli::Args, experiment_file::tests::quickstart, progress::tests::Captured};
 
-/// No command here takes so long, even on a busy machine.
+/// A time limit beyond that of any command here, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Commands that only look at experiments, or change what is stored of them. TO is a file, which
-/// has to be the same, too.
+/// Commands that only read experiments, or change stored ones. TO is a file, which must be
+/// equal, too.
 const ASKED: &[&str] = &[
     "list",
     "list --output json",
@@ -120,7 +121,7 @@ const ASKED: &[&str] = &[
     "resume 9 --generations 2",
 ];
 
-/// Commands that set something going: the experiments are the same in the end.
+/// Commands that start experiments: the experiments are equal in the end.
 const COMPUTED: &[(&str, &str)] = &[
     ("submit FILE --generations 2 --seed 5", " --watch"),
     ("submit FILE --generations 1 --seeds 0..1 --group seeds", " --watch"),
@@ -132,7 +133,8 @@ const COMPUTED: &[(&str, &str)] = &[
     ("verify exported.zip --generations 1", ""),
 ];
 
-/// What has no experiments of a place, or of one of the two only; it has tests of its own.
+/// Commands that use no experiments of a place, or only those of one kind of place; they
+/// have other tests.
 const ALONE: &[&str] = &[
     "backup",
     "bench",
@@ -151,7 +153,7 @@ const ALONE: &[&str] = &[
     "workers",
 ];
 
-/// What a command line printed, and how it ended.
+/// The output of a command line, and its outcome.
 pub async fn output(line: &str, place: &[&str]) -> String {
     let captured = Captured::default();
     let words = ["swarmctl"].into_iter().chain(line.split(' ')).chain(place.iter().copied());
@@ -166,7 +168,7 @@ pub async fn output(line: &str, place: &[&str]) -> String {
     captured.lines().join("\n") + &end
 }
 
-/// A data directory with a run of SNES, one of a GA, and one that nobody computes.
+/// A data directory with a run of SNES, one of a GA, and one that no program computes.
 async fn data_dir(directory: &Path) -> PathBuf {
     let path = directory.join("data");
     let at = ["--data-dir", path.to_str().unwrap()];
@@ -179,7 +181,7 @@ async fn data_dir(directory: &Path) -> PathBuf {
     let ga_file = directory.join("two.json");
     fs::write(&ga_file, ga.to_string()).unwrap();
     output(&format!("run {} --generations 3", ga_file.display()), &at).await;
-    // Its submission is stored, and nobody computes it.
+    // The directory stores the submission, but no program computes it.
     let place = crate::place::Place::Directory { path: path.clone(), is_found: false };
     let connection =
         crate::connection::Connection::to(place, crate::place::Intent::Submit).await.unwrap();
@@ -233,7 +235,7 @@ impl Fleet {
     }
 }
 
-/// The same line in a place whose files have names of their own; and those that it wrote.
+/// Runs the line in a place that has its own file names; returns the written files, too.
 async fn output_at(line: &str, place: &[&str], directory: &Path, name: &str) -> (String, Vec<u8>) {
     let to = directory.join(name);
     let file = quickstart().display().to_string();
@@ -241,7 +243,7 @@ async fn output_at(line: &str, place: &[&str], directory: &Path, name: &str) -> 
     let concrete = line.replace("TO", to.to_str().unwrap());
     let concrete = concrete.replace("FILE", &file).replace("exported.zip", &exported);
     let text = output(&concrete, place).await.replace(to.to_str().unwrap(), "TO");
-    // Advice names a directory that commands do not find by themselves.
+    // Advice names the directory unless commands find it by themselves.
     let text = text.replace(&format!(" {}", place.join(" ")), "");
     let text = if line.starts_with("list") { without_ages(&text) } else { text };
     let mut written = Vec::new();
@@ -263,7 +265,7 @@ fn without_ages(list: &str) -> String {
     kept.collect::<Vec<_>>().join(" ")
 }
 
-/// Without what differs from one computation to the next.
+/// The text without parts that differ between computations.
 fn without_times(text: &str) -> String {
     let mut value: serde_json::Value = serde_json::from_str(text).unwrap();
     for experiment in value.as_array_mut().unwrap() {

@@ -1,5 +1,4 @@
-//! `swarmctl plot`: figures of fitness against generation, or of a measure against
-//! the step.
+//! `swarmctl plot`: figures of fitness over generations, or of a measure over steps.
 
 mod args;
 mod steps;
@@ -22,14 +21,13 @@ use crate::{
 
 pub use self::args::PlotArgs;
 
-/// Reads the runs and draws them. The coordinator is asked only for what is not in
-/// a file.
+/// Reads the runs and draws them. Asks the coordinator only about runs without a file.
 pub async fn plot(
     settings: Settings,
     args: &PlotArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    // A bad name of the figure is refused before anything is read.
+    // Refuses a bad name of the figure before reading anything.
     Format::check(&args.to, args.overwrite)?;
     if let Some(dir) = &args.steps {
         return plot_steps(dir, args, progress);
@@ -116,7 +114,7 @@ impl Plotted {
     }
 }
 
-/// Names for the legend; those that several runs have are followed by the source.
+/// Names for the legend; ambiguous names are followed by their source.
 fn names(runs: &[Run]) -> Vec<String> {
     let is_ambiguous = |run: &Run| runs.iter().filter(|other| other.name == run.name).count() > 1;
     let name = |run: &Run| match is_ambiguous(run) {
@@ -126,7 +124,8 @@ fn names(runs: &[Run]) -> Vec<String> {
     runs.iter().map(name).collect()
 }
 
-/// The fitness function of all runs of which it is known; two cannot share an axis.
+/// The fitness function of all runs whose function is known; two functions cannot share
+/// an axis.
 fn common_function(runs: &[Run]) -> Result<Option<&str>, Error> {
     let mut known = runs.iter().filter_map(|run| Some((run, run.function.as_deref()?)));
     let Some((first, function)) = known.next() else { return Ok(None) };

@@ -1,4 +1,5 @@
-//! Experiments of the same file with its keys in another order: they are not the same.
+//! Experiments whose files differ only in the order of their keys: they are different
+//! experiments.
 
 use std::cmp::Reverse;
 
@@ -9,14 +10,14 @@ use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
 use crate::{connection::Connection, text};
 
-/// Most files that are compared with those of a submission.
+/// Maximum number of files that are compared with those of a submission.
 const COMPARED_MAX: usize = 16;
 
-/// Says of what was submitted that an earlier experiment is of the same file with its keys in
-/// another order, so that nobody wonders why it is computed again. Of several, the first counts.
+/// Explains why a submission is computed again if the file of an earlier experiment differs only
+/// in the order of its keys. Names the first such experiment.
 pub async fn remark(connection: &Connection, submitted: &[Experiment]) -> Option<String> {
     let first = submitted.first()?;
-    // What has been submitted is so, even if nothing can be said of it.
+    // The submission succeeded, even if this remark fails.
     let states = [ExperimentState::Completed, ExperimentState::Running, ExperimentState::Paused];
     let states = states.map(Into::into).to_vec();
     let wanted = ListExperimentsRequest { states, ..Default::default() };
@@ -30,9 +31,9 @@ pub async fn remark(connection: &Connection, submitted: &[Experiment]) -> Option
     for other in earlier.iter().take(COMPARED_MAX) {
         if without_order(&connection.stored(other.id).await.ok()?.1)? == file {
             return Some(format!(
-                "{} is of this file with its keys in another order; the order of ensembles, \
+                "{} has this file with its keys in another order; the order of ensembles, \
                  synapses and objects is the order of genes and random draws, so experiment {} is \
-                 computed as one of its own",
+                 computed separately",
                 text::title(other),
                 first.id
             ));
@@ -41,7 +42,7 @@ pub async fn remark(connection: &Connection, submitted: &[Experiment]) -> Option
     None
 }
 
-/// Whether an experiment could be of the same file as a later one, but for the order.
+/// Whether an experiment could have the same file as a later one, except for the order.
 fn may_be_reordered(earlier: &Experiment, later: &Experiment) -> bool {
     earlier.id < later.id
         && (&earlier.name, earlier.seed) == (&later.name, later.seed)
@@ -49,8 +50,8 @@ fn may_be_reordered(earlier: &Experiment, later: &Experiment) -> bool {
         && earlier.forked_from.is_none()
 }
 
-/// A file in canonical form as a value that equals those with its keys in another order, as far
-/// as a digest covers it: the length of the run makes no other experiment.
+/// A file in canonical form as a value that does not depend on the order of its keys, nor on
+/// the length of the run, which a digest does not cover.
 fn without_order(config_json: &str) -> Option<Value> {
     let config = ExperimentConfig::from_canonical_json(config_json).ok()?;
     serde_json::to_value(Digest::covered(config)).ok()
@@ -109,7 +110,7 @@ mod tests {
         }
         let said = remark(&connection, std::slice::from_ref(reordered)).await.unwrap();
         connection.close().await;
-        let expected = "experiment 1 (quickstart) is of this file with its keys in another order";
+        let expected = "experiment 1 (quickstart) has this file with its keys in another order";
         assert!(said.starts_with(expected) && said.contains("so experiment 3 is"), "{said}");
     }
 }

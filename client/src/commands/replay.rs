@@ -1,4 +1,4 @@
-//! `swarmctl replay`: an episode in one HTML file, to be watched in a browser, or as PNG.
+//! `swarmctl replay`: an episode as one HTML file for a browser, or as a picture.
 
 mod picture;
 
@@ -28,20 +28,20 @@ use crate::{
     text, waiting,
 };
 
-/// Write an HTML file in which an episode can be watched, step by step, in any browser.
+/// Write an episode as an HTML file that plays step by step in any browser.
 ///
-/// The swarm is simulated again, to the same bits as in evolution: any individual of any
-/// generation plays, and nothing has to be recorded for it. The file needs no network and
-/// no program beside a browser, so it can go with a paper. It shows the world, who hears
-/// whom, LEDs, measures, and what every neuron of a robot does.
+/// The command simulates the swarm again, to the same bits as in evolution, so you can
+/// replay any individual of any generation without a recording. The file needs only a
+/// browser and no network, so it can accompany a paper. It shows the world, which robots
+/// hear which, LEDs, measures, and the activity of every neuron of a robot.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ReplayArgs {
-    /// Whom: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation G;
-    /// ID@G/mean, the mean of the distribution after generation G.
+    /// The genotype: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation
+    /// G; ID@G/mean, the mean of the distribution after generation G.
     #[arg(add = ArgValueCompleter::new(complete::experiments), required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
     address: Option<NamedAddress>,
-    /// Experiment file, instead of that of an experiment; with --genotype.
+    /// Experiment file of --genotype, instead of an address.
     #[arg(long, value_name = "FILE", requires = "genotype")]
     config: Option<PathBuf>,
     /// File with the genotype: a JSON list of genes, or an object with a `genotype`,
@@ -52,15 +52,15 @@ pub struct ReplayArgs {
     changed: ChangedArg,
     #[command(flatten)]
     seed: SeedArg,
-    /// Generation, from 0, whose worlds to simulate [default: that of the address; 0 for an
+    /// Generation of the worlds to simulate, from 0 [default: that of the address; 0 for an
     /// experiment file]
     #[arg(long, value_name = "G", value_parser = whole(0..=u64::MAX))]
     generation: Option<u64>,
-    /// Which world of the generation [default: of a champion, the trial that is the median of those
-    /// by which it was judged; else 0]
+    /// Trial of the generation, which sets the world [default: for a champion, the median trial of
+    /// its judgement; else 0]
     #[arg(long, value_name = "N", value_parser = whole(0..=limits::TRIALS - 1))]
     trial: Option<u32>,
-    /// Which of the trials by which a champion was judged.
+    /// Trial of the champion's judgement.
     #[arg(long, value_name = "N", conflicts_with_all = ["trial", "generation", "genotype"])]
     judged: Option<u32>,
     #[command(flatten)]
@@ -120,9 +120,8 @@ pub async fn replay(
     let episode = match judged {
         Some(judged) if args.trial.is_none() && args.generation.is_none() => {
             let n = judged.trials;
-            let what = format!(
-                "computing the {n} trials by which it was judged; --trial N plays one alone"
-            );
+            let what =
+                format!("computing the {n} trials of its judgement; --trial N plays one alone");
             let all = waiting::busy(&what, || {
                 Trials::of_judgement(episode.simulation, episode.genotype, &judged, &|| true)
             });
@@ -130,7 +129,7 @@ pub async fn replay(
             let all = all.expect("nothing stops it");
             let (trial, what) = judged_trial(&all, judged.trials, args.judged)?;
             progress.remark(&what);
-            // Of a changed swarm, nothing was judged.
+            // A changed swarm has no judgement.
             trials = is_as_evolved.then_some(all);
             Episode { trial_set: TrialSet::Judgement(judged.generation), trial, ..episode }
         }
@@ -150,35 +149,35 @@ pub async fn replay(
     progress.print(&path.display().to_string())
 }
 
-/// What plays.
+/// The genotype to replay.
 struct Subject {
     file: ExperimentFile,
     genotype: Genotype,
-    /// Whose worlds.
+    /// The generation of the worlds.
     generation: u64,
     judged: Option<JudgedFitness>,
 }
 
-/// The trial of a judgement that is wanted, or the median one; and what is to be said of it.
+/// The requested trial of a judgement, or the median one; and a remark about it.
 fn judged_trial(trials: &Trials, n: u32, wanted: Option<u32>) -> Result<(u32, String), Error> {
     if let Some(trial) = wanted {
         if trial >= n {
             let last = n.saturating_sub(1);
             return Err(Error::Input(format!("--judged {trial}: the trials are 0 to {last}")));
         }
-        return Ok((trial, format!("playing trial {trial} of the {n} by which it was judged")));
+        return Ok((trial, format!("playing trial {trial} of the {n} that judged it")));
     }
     let trial = trials.median();
     let value = trials.fitness(trial);
     let what = format!(
-        "playing trial {trial} of the {n} by which it was judged, the median: fitness {}; \
+        "playing trial {trial} of the {n} that judged it, the median: fitness {}; \
          others: --judged N, or --trial N of its generation",
         text::number(value, 6)
     );
     Ok((trial, what))
 }
 
-/// What a file holds.
+/// The contents of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Html,
@@ -208,7 +207,7 @@ fn steps(episode: &Episode<'_>) -> Result<Vec<StepRecord>, Error> {
 }
 
 impl ReplayArgs {
-    /// The experiment, who of it, and whose worlds.
+    /// The experiment, the genotype, and the worlds.
     async fn subject(&self, settings: Settings, progress: &Progress) -> Result<Subject, Error> {
         if let (Some(config), Some(genotype)) = (&self.config, &self.genotype) {
             let file = ExperimentFile::read(config);
@@ -227,7 +226,8 @@ impl ReplayArgs {
         Ok(Subject { file, genotype: Genotype::found(address, found), generation, judged })
     }
 
-    /// Who plays, for those who get the file: of a path, which is this machine's, the name.
+    /// The genotype, for readers of the file: only the name of a path, because the path is
+    /// of this machine.
     fn title(&self, genotype: &Genotype) -> String {
         match self.genotype.as_deref().and_then(Path::file_name) {
             Some(name) => format!("genotype in {}", name.display()),

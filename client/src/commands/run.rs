@@ -33,15 +33,15 @@ use super::{
     watch,
 };
 
-/// How long a coordinator that may be running beside has to answer.
+/// Time limit for the answer of another coordinator on this machine.
 const ANSWER_TIME: Duration = Duration::from_millis(300);
 
 /// Run an experiment in this process, from file to champion.
 ///
-/// Starts a coordinator and workers in this process, the same code as on a fleet,
-/// and follows the experiment to its end. An interrupt loses at most one
-/// generation: the same command continues the experiment. What has completed in the data
-/// directory already is shown again, and not computed a second time.
+/// Starts a coordinator and workers in this process, with the same code as on a fleet,
+/// and follows the experiment to its end. An interrupt loses at most one generation: the
+/// same command continues the experiment. If the experiment has already completed in the
+/// data directory, the command only shows its result.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct RunArgs {
@@ -50,18 +50,19 @@ pub struct RunArgs {
     /// Number of workers, each of one slot [default: the number of cores]
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1..=1024))]
     pub workers: Option<u16>,
-    /// Begin anew what has completed in this directory already, instead of showing it again.
+    /// Rerun an experiment that has completed in this directory, instead of showing its
+    /// result.
     #[arg(long)]
     pub new: bool,
     /// Serve pages with the curve, every individual and replays, and print their address. They
-    /// stay after the run, until an interrupt.
+    /// stay after the run, until you press Ctrl-C.
     #[arg(long)]
     pub web: bool,
     #[command(flatten)]
     pub isa: IsaArgs,
 }
 
-/// Where pages are: a free port.
+/// The address of the pages: a free port.
 const PAGES: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
 const HELP: &str = "\
@@ -82,11 +83,11 @@ pub async fn run(
     mut progress: Progress,
     interrupt: CancellationToken,
 ) -> Result<(), Error> {
-    // A bad file is refused before the data directory is created.
+    // Refuses a bad file before creating the data directory.
     let mut runs = sweep::runs(&args.experiment)?;
     let data_dir = data_dir(&settings);
     for run in &mut runs {
-        // A run of a group is found by its request.
+        // The request id finds a run of a group.
         run.request.resume_unfinished = run.group().is_none();
     }
     let n_workers = args.workers.map_or_else(cores, usize::from);
@@ -143,9 +144,9 @@ async fn evolve(
     watch::watch(connection, submitted, progress).await
 }
 
-/// The experiment that has completed in the data directory with this file, seed and number of
-/// generations, unless it is to begin anew, and the name that the file gives; one of no group, if
-/// there is one. Runs of a group are found by their requests.
+/// The completed experiment in the data directory with this file, seed and number of generations,
+/// and the name in the file; none with `--new`. Prefers an experiment without a group. Runs of a
+/// group are found by their requests.
 async fn existing(
     connection: &Connection,
     runs: &[SweepRun],
@@ -173,7 +174,7 @@ async fn existing(
     Ok(same.map(|experiment| (experiment, config.name)))
 }
 
-/// Says what exists, and what else can be wanted; `name`: that of the file.
+/// Reports the existing experiment, and the alternatives; `name`: that of the file.
 fn already_completed(existing: &Experiment, name: &str) -> String {
     let of_group = match &*existing.group {
         "" => String::new(),
@@ -191,7 +192,7 @@ fn already_completed(existing: &Experiment, name: &str) -> String {
     )
 }
 
-/// Suggests the coordinator of the settings, if one answers there.
+/// Suggests the coordinator of the settings, if it answers.
 async fn running_coordinator(settings: Settings, experiment: Vec<String>) -> Option<String> {
     let settings = settings.or_file().ok()?;
     let connection = Connection::new(settings.address(), &settings.credentials().ok()?);
@@ -234,7 +235,7 @@ fn remarks(submitted: &[Experiment], unfinished: &[Experiment]) -> Vec<String> {
 fn interrupted(data_dir: &Path) -> Error {
     let args = env::args_os().map(|arg| arg.to_string_lossy().into_owned());
     Error::Interrupted(format!(
-        "all complete generations are stored in {}. Continue with:\n  {}",
+        "{} stores all complete generations. Continue with:\n  {}",
         data_dir.display(),
         text::shell_command(args)
     ))

@@ -26,8 +26,8 @@ use crate::{
 pub use self::args::SimulateArgs;
 use self::{genotype::Genotype, trace::Trace};
 
-/// Simulates the trials one after the other. A coordinator is asked only for a genotype of
-/// one of its experiments.
+/// Simulates the trials one after the other. Asks a coordinator only for a genotype of one
+/// of its experiments.
 pub async fn simulate(
     settings: Settings,
     args: &SimulateArgs,
@@ -35,7 +35,7 @@ pub async fn simulate(
 ) -> Result<(), Error> {
     args.trace.as_deref().map(|path| args.overwrite.check(path)).transpose()?;
     let Subject { compiled, genotype, generation } = subject(settings, args, progress).await?;
-    // A genotype that does not fit is refused before a file is touched.
+    // Refuses an unfit genotype before touching a file.
     let refused = |error: EvaluateError| Error::Input(format!("{genotype}: {error}"));
     compiled.experiment.network_json(&genotype.genes).map_err(refused)?;
     let mut trace = match &args.trace {
@@ -77,11 +77,11 @@ pub async fn simulate(
     }
 }
 
-/// What to simulate.
+/// The genotype and the experiment to simulate.
 struct Subject {
     compiled: Compiled,
     genotype: Genotype,
-    /// Whose worlds.
+    /// The generation of the worlds.
     generation: u64,
 }
 
@@ -115,7 +115,7 @@ async fn subject(
     Ok(Subject { compiled, genotype, generation: args.generation.unwrap_or_default() })
 }
 
-/// What was simulated, with fitness and measures per trial.
+/// The simulated experiment, with fitness and measures per trial.
 #[derive(Debug, Serialize)]
 struct SimulationReport<'a> {
     name: &'a str,
@@ -166,7 +166,7 @@ impl SimulationReport<'_> {
     }
 }
 
-/// Means over the trials; of a measure, over those that have it.
+/// Means over the trials; for a measure, over the trials that have it.
 fn mean(trials: &[Trial]) -> EpisodeSummary {
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));

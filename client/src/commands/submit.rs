@@ -28,19 +28,19 @@ family! {
 
 /// Submit an experiment, or a group of runs of it, to the coordinator.
 ///
-/// Runs of a group share the fleet: while one waits for the last items of its generation,
-/// others compute. The same command again adds what is missing: a run that the group has
-/// already is not computed again.
+/// The runs of a group share the fleet: while one waits for the last items of its
+/// generation, workers compute others. If you repeat the command, it submits only the
+/// runs that the group lacks.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct SubmitArgs {
     #[command(flatten)]
     pub experiment: ExperimentArgs,
-    /// Its share of the fleet relative to other experiments, 1 to 1000 [default: 100]
+    /// Share of the fleet relative to other experiments, 1 to 1000 [default: 100]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=1000))]
     pub priority: Option<u32>,
-    /// If an experiment of the same file, seed and version has completed, answer with it instead
-    /// of computing it again.
+    /// If an experiment with the same file, seed and version has completed, return it instead of
+    /// computing it again.
     #[arg(long)]
     pub reuse: bool,
     /// Follow the experiment to its end, as `swarmctl watch` does.
@@ -110,16 +110,16 @@ async fn submit(
     if is_followed { watch::watch(connection, submitted, progress).await } else { Ok(()) }
 }
 
-/// How runs are submitted.
+/// Options of a submission.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Manner {
     pub priority: Option<u32>,
-    /// Whether to answer with an identical experiment that has completed; none: nothing is said
-    /// of identical ones.
+    /// Whether to return an identical completed experiment; none: remarks about identical
+    /// experiments are left out.
     pub reuse: Option<bool>,
 }
 
-/// Submits runs one after the other. A run of a group that exists already is that one.
+/// Submits runs one after the other. For an existing run of a group, returns that run.
 pub async fn submit_all(
     runs: &[SweepRun],
     manner: Manner,
@@ -143,7 +143,7 @@ pub async fn submit_all(
             n => Error::Incomplete { n_submitted: n, n_runs: runs.len(), cause: error.into() },
         })?;
         let warnings = run.file.warnings(&response.warnings);
-        // Runs of one file have the same, mostly.
+        // The runs of one file mostly have the same warnings.
         if warnings != last_warnings {
             warnings.iter().for_each(|warnings| progress.remark(warnings));
             last_warnings = warnings;
@@ -286,7 +286,7 @@ mod tests {
         let error = args.execute(&connection, &mut progress).await.unwrap_err();
         assert_eq!(error.exit_code(), 3);
         let report = error.report();
-        for part in ["1 of 3 runs", "1000 experiments", "same command again"] {
+        for part in ["1 of 3 runs", "1000 experiments", "repeat the command"] {
             assert!(report.contains(part), "{report}");
         }
     }

@@ -1,5 +1,5 @@
-//! What people see: every command's help and output, against a scripted
-//! coordinator, and each option's refusals.
+//! The output that users see: the help and the answers of every command, with a scripted
+//! coordinator, and the refusals of each option.
 
 use std::collections::BTreeSet;
 
@@ -135,7 +135,7 @@ fn script() -> Script {
     }
 }
 
-/// What commands print, and how they end, one after the other.
+/// The output and the exit code of commands, one after the other.
 async fn transcript(script: Script, lines: &[&str]) -> String {
     transcript_on(None, script, lines).await
 }
@@ -168,7 +168,7 @@ async fn transcript_on(width: Option<usize>, script: Script, lines: &[&str]) -> 
             section.push(format!("[exit code {code}]"));
         }
         let section = section.join("\n").replace(connection.address(), "http://HOST:PORT");
-        // Its age is the same in every transcript, and so the time is not.
+        // Its age is the same in every transcript, so the time differs.
         let section = section.replace(&submitted_at_ms.to_string(), "SUBMITTED_MS");
         let section = section.replace(&clock::utc(submitted_at_ms), "SUBMITTED-AT-IN--UTC");
         sections.push(section);
@@ -177,7 +177,7 @@ async fn transcript_on(width: Option<usize>, script: Script, lines: &[&str]) -> 
 }
 
 fn page(command: &clap::Command) -> String {
-    // What all commands have in common is on the first page.
+    // Options of all commands appear on the first page only.
     let mut command = command.clone().mut_args(|arg| {
         let is_common = arg.is_global_set();
         arg.hide(is_common)
@@ -331,7 +331,7 @@ async fn one_huge_number_makes_no_table_wide() {
     }
 }
 
-/// Old words, and the new ones that say the same.
+/// Old commands, and their replacements.
 const OLD_WORDS: &[(&str, &str)] = &[
     ("wait 3", "watch 3 --quiet"),
     ("wait leader --output json", "watch leader --quiet --output json"),

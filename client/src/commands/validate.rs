@@ -16,13 +16,14 @@ use crate::{
 /// Check experiment files, without a coordinator.
 ///
 /// Prints one line per valid file, its warnings, and every problem of every invalid one. A
-/// warning is about a value that is allowed and rarely meant, such as degrees instead of radians.
+/// warning concerns a value that is allowed but rarely intended, such as degrees instead of
+/// radians.
 #[derive(Debug, Args)]
 pub struct ValidateArgs {
     /// The experiment files.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Fail (exit code 2) if a file has warnings, too.
+    /// Also fail (exit code 2) if a file has warnings.
     #[arg(long)]
     pub strict: bool,
 }

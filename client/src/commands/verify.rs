@@ -1,4 +1,4 @@
-//! `swarmctl verify`: says what of a bundle is proven.
+//! `swarmctl verify`: proves the claims of a bundle.
 
 use std::path::PathBuf;
 
@@ -12,12 +12,12 @@ use crate::{
     settings::Settings, waiting,
 };
 
-/// Check a bundle without trusting whoever made it.
+/// Check a bundle without trusting its author.
 ///
-/// Evolution is gone through again from the experiment file and the fitness log: every link of
-/// the digest chain, the history, the keyframes and the champion have to come out to the same
-/// bits. Of some generations, drawn by the last link of the chain, and of the champion's
-/// judgement, the fitness is simulated again, here or on a fleet.
+/// The command repeats the evolution from the experiment file and the fitness log: every link
+/// of the digest chain, the history, the keyframes and the champion must have the same bits.
+/// It also simulates the champion's judgement and some generations again, here or on a fleet.
+/// The last link of the chain selects these generations.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct VerifyArgs {
@@ -34,10 +34,10 @@ pub struct VerifyArgs {
 }
 
 const HELP: &str = "\
-It simulates in this process, or, where --coordinator or SWARM_COORDINATOR names a
-coordinator, on its fleet.
+The command simulates in this process, or on the fleet of the coordinator that
+--coordinator or SWARM_COORDINATOR names.
 
-Exit code 12 if the bundle is not what it says.
+Exit code 12 if a claim of the bundle is false.
 
 Examples:
   swarmctl verify leader.zip
@@ -51,7 +51,7 @@ fn sample(text: &str) -> Result<Sample, String> {
     }
 }
 
-/// What was found, for programs.
+/// The result, for programs.
 #[derive(Debug, Serialize)]
 struct Report {
     file: String,

@@ -36,12 +36,13 @@ use self::{
     quiet::WaitFor,
 };
 
-/// Most experiments of a group that are followed at the same time, each by a stream of the
-/// one connection, which has one more for their situation; others follow when one has ended.
+/// Maximum number of experiments of a group that are followed at the same time. Each takes a
+/// stream of the one connection, and their situation takes one more. When one ends, the next
+/// is followed.
 const STREAMS_MAX: usize = 64;
-/// How often it is looked whether somebody computes what is in a data directory.
+/// How often the command checks whether a program computes the data directory.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// News that may wait to be shown.
+/// Capacity of the channel of news.
 const NEWS_MAX: usize = 16;
 
 /// An experiment that has ended.
@@ -56,10 +57,10 @@ pub struct Followed {
 
 /// Follow an experiment, or a group of them, from the first generation to the end.
 ///
-/// Generations that are complete already are shown first. What keeps the experiment from
-/// being computed, such as a pause or a lack of workers, is said at once, with the next step. If the coordinator
-/// becomes unreachable, this tries for a minute to reach it again. Interrupting
-/// this command does not interrupt the experiment.
+/// The command first shows the generations that are already complete. It reports at once any
+/// obstacle, such as a pause or a lack of workers, with the next step. If the coordinator becomes
+/// unreachable, it tries for a minute to reconnect. Interrupting this command does not interrupt
+/// the experiment.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct WatchArgs {
@@ -84,11 +85,10 @@ pub struct WatchArgs {
         requires = "subject"
     )]
     from_sequence: u64,
-    /// End after the events so far.
+    /// Print the events so far, then end.
     #[arg(long, requires = "events")]
     so_far: bool,
-    /// Print nothing but how the experiment ended. Standard error still says what keeps it from
-    /// being computed.
+    /// Print only the outcome of the experiment. Standard error still reports obstacles.
     #[arg(long)]
     quiet: bool,
     /// Which end counts as success.
@@ -111,10 +111,10 @@ for each experiment with state, digest and champion; with --events a line per
 event, with kind generation, state or notice.
 
 Exit codes:
-  0   it completed, or ended as --for demands; of --events: it has ended
-  5   it failed
-  6   it was cancelled
-  10  it has not ended within --timeout
+  0   the experiment completed, or ended as --for allows; with --events: it ended
+  5   the experiment failed
+  6   the experiment was cancelled
+  10  the experiment has not ended within --timeout
 
 Examples:
   swarmctl watch 3 --output json | jq .best
@@ -180,7 +180,7 @@ pub async fn watch(
     all.iter().try_for_each(|followed| success(&followed.experiment))
 }
 
-/// Compares the runs of a group, and says what else there is to see of them.
+/// Compares the runs of a group, and suggests further commands about them.
 async fn compare_group(
     connection: &Connection,
     all: &[Followed],
@@ -239,7 +239,7 @@ pub async fn follow(
                 Ok(first_best) => News::Ended(follower.experiment_id, first_best),
                 Err(error) => News::Failed(error),
             };
-            // Whoever is not interested any more has failed.
+            // The receiver is gone only if it has failed.
             let _ = sender.send(last).await;
         });
     }
@@ -247,13 +247,13 @@ pub async fn follow(
     let mut ended = Vec::new();
     let mut last_loss = String::new();
     while ended.len() < n_followed {
-        // One of the tasks goes on until the last experiment has ended.
+        // One of the tasks runs until the last experiment has ended.
         let Some(news) = news.recv().await else { break };
         match news {
             News::Situation(id, finding) => progress.situation(id, finding.as_ref()),
             News::Generation(id, summary) => progress.generation(id, &summary)?,
             News::Notice(id, text) => progress.notice(id, &text),
-            // Those who follow one coordinator lose it together.
+            // All followers of one coordinator lose it together.
             News::Lost(text) if text == last_loss => {}
             News::Lost(text) => {
                 progress.remark(&text);
@@ -288,8 +288,8 @@ async fn final_state(
     Ok(Followed { experiment, champion, first_best })
 }
 
-/// An experiment once it has ended. Says nothing but what keeps it from being computed, and that
-/// the coordinator is lost: neither may be waited for in silence.
+/// Waits until an experiment has ended. Reports only obstacles and a lost coordinator, because
+/// neither may pass in silence.
 pub async fn ended(
     connection: &Connection,
     experiment: Experiment,
@@ -305,7 +305,7 @@ pub async fn ended(
     let end = async {
         tokio::select! {
             end = follower.run(next) => end,
-            // Those who follow the experiment see its end.
+            // The followers of the experiment report its end.
             never = async {
                 situation::tell(connection.clone(), vec![experiment_id], sender).await;
                 pending().await
@@ -329,8 +329,8 @@ pub async fn ended(
     connection.experiment(experiment_id).await
 }
 
-/// Waits until nobody computes experiments of a data directory that have not ended; says so. For
-/// ever, if a coordinator is asked or this process computes.
+/// Waits until no program computes the unfinished experiments of a data directory, then returns
+/// that error. Waits for ever with a coordinator, or if this process computes.
 pub async fn deserted(connection: &Connection, experiments: &[Experiment]) -> Error {
     let Some(data_dir) = connection.data_dir().filter(|_| !connection.computes()) else {
         return pending().await;

@@ -17,15 +17,16 @@ use crate::{
     settings::Settings,
 };
 
-/// Serve pages of the experiments in a data directory, to be looked at in a browser.
+/// Serve the experiments of a data directory as pages for a browser.
 ///
-/// They show curves, every individual that ever lived, comparisons and replays. Nothing is
-/// written to the directory, and a coordinator may use it meanwhile. The address that is
-/// printed lets a browser in, and nobody else on this machine. Ends with an interrupt.
+/// The pages show curves, every individual, comparisons and replays. The command never
+/// writes to the directory, and a coordinator may use it meanwhile. Only browsers
+/// that open the printed address get access, so other users of this machine do not.
+/// Ctrl-C ends the command.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct WebArgs {
-    /// Address to listen on, of this machine only; port 0 takes a free one.
+    /// Address to listen on, of this machine only; port 0 selects a free port.
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:0", value_parser = listen_address)]
     web_listen: SocketAddr,
 }

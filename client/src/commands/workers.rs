@@ -1,4 +1,4 @@
-//! `swarmctl workers`: the connected workers, and letting one out of quarantine.
+//! `swarmctl workers`: lists the connected workers, or readmits one from quarantine.
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
@@ -33,7 +33,7 @@ const CSV_KEYS: [&str; 13] = [
     "experiments",
 ];
 
-/// A connected worker, as JSON and CSV have it.
+/// A connected worker, for JSON and CSV.
 #[derive(Debug, Serialize)]
 struct Record<'a> {
     id: u64,
@@ -73,15 +73,16 @@ impl<'a> From<&'a Worker> for Record<'a> {
 
 /// List the connected workers, or readmit one that is in quarantine.
 ///
-/// Results per second and the idle share of the slots are those of the last minute.
-/// `items` is the number of items assigned to a worker. `--output wide` has the reasons
-/// of the two states in which a worker gets none. `waiting`: it returned nothing, or its
-/// word is in doubt; that passes by itself. `quarantine`: it returned what is proved
-/// wrong, and stays there, restarts included, until it is readmitted. `takes`: the
-/// experiments whose items it computes, as `worker --experiments` says.
+/// Results per second and the idle share of the slots cover the last minute. `items` is
+/// the number of items assigned to a worker. In two states a worker gets no items, and
+/// `--output wide` shows the reason. `waiting`: the worker returned nothing, or its
+/// results are in doubt; this passes by itself. `quarantine`: the worker returned a
+/// result that is proved wrong; it stays there, even after restarts, until you readmit
+/// it. `takes` names the experiments whose items it computes, as set by `worker
+/// --experiments`.
 #[derive(Debug, Args)]
 pub struct WorkersArgs {
-    /// Let this worker out of quarantine: it gets items again.
+    /// Readmit this worker from quarantine, so that it gets items again.
     #[arg(long, value_name = "NAME", add = ArgValueCompleter::new(complete::quarantined), allow_hyphen_values = true)]
     readmit: Option<String>,
 }
@@ -105,7 +106,7 @@ impl Remote for WorkersArgs {
         let request = ListWorkersRequest {};
         let response =
             connection.call_fleet(async |client| client.list_workers(request).await).await?;
-        // By the clock that said when they were heard.
+        // Ages are relative to the coordinator's clock, which also took the times.
         let now_ms = Some(response.now_ms).filter(|&now_ms| now_ms > 0);
         let workers = response.workers;
         let records: Vec<Record<'_>> = workers.iter().map(Into::into).collect();

@@ -35,7 +35,7 @@ impl Connection {
         present(response.experiment)
     }
 
-    /// The measures of a genotype, as a stream; tried once.
+    /// The measures of a genotype, as a stream; not repeated.
     pub async fn evaluate(
         &self,
         request: EvaluateRequest,
@@ -62,7 +62,8 @@ impl Connection {
         Ok(generations)
     }
 
-    /// How evolution moved in all completed generations, of a fork in its own ones.
+    /// The movement of evolution in all completed generations; for a fork, in its own
+    /// generations.
     pub async fn dynamics(&self, experiment_id: u64) -> Result<Vec<GenerationDynamics>, Error> {
         let mut generations = Vec::new();
         let mut next = Some(0);
@@ -87,7 +88,7 @@ impl Connection {
         Ok(page.events)
     }
 
-    /// An experiment's events from a sequence number on, past and future; tried once.
+    /// An experiment's events from a sequence number on, past and future; not repeated.
     pub async fn events(
         &self,
         experiment_id: u64,
@@ -97,7 +98,7 @@ impl Connection {
         self.client.clone().watch_experiment(request).await.map(Response::into_inner)
     }
 
-    /// What an experiment waits for, at once and whenever that changes; tried once.
+    /// The explanation of an experiment, at once and at every change; not repeated.
     pub async fn explanations(
         &self,
         experiment_id: u64,
@@ -106,13 +107,13 @@ impl Connection {
         self.client.clone().watch_explanation(request).await.map(Response::into_inner)
     }
 
-    /// A message at once, and whenever there may be events of any experiment; tried once.
+    /// A message at once, and whenever any experiment may have new events; not repeated.
     pub async fn news(&self) -> Result<Streaming<WatchNewsResponse>, Status> {
         let request = WatchNewsRequest {};
         self.client.clone().watch_news(request).await.map(Response::into_inner)
     }
 
-    /// An ended experiment as a bundle; tried once.
+    /// An ended experiment as a bundle; not repeated.
     pub async fn export(&self, experiment_id: u64) -> Result<Vec<u8>, Error> {
         let bundle = async {
             let request = ExportExperimentRequest { experiment_id };
@@ -129,7 +130,8 @@ impl Connection {
         }
     }
 
-    /// Hands a bundle in; tried once. Returns its experiment, and whether it is new there.
+    /// Imports a bundle; not repeated. Returns its experiment, and whether that is new
+    /// there.
     pub async fn import(&self, bundle: &[u8]) -> Result<(Experiment, bool), Error> {
         let pieces = bundle.chunks(PIECE_LEN).map(<[u8]>::to_vec).collect::<Vec<_>>();
         let requests = pieces.into_iter().map(|piece| ImportExperimentRequest { piece });
@@ -143,8 +145,8 @@ impl Connection {
         }
     }
 
-    /// The fitness of genotypes in trials of an evolution, however long that takes.
-    /// `otherwise`: what works without a fleet.
+    /// The fitness of genotypes in trials of an evolution, without a time limit.
+    /// `otherwise`: the alternative without a fleet.
     pub async fn fitness(
         &self,
         request: EvaluateFitnessRequest,

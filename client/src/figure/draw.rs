@@ -1,4 +1,4 @@
-//! How figures look.
+//! The layout of figures.
 
 use std::{fmt::Display, ops::Range, sync::Once};
 
@@ -18,16 +18,16 @@ use crate::error::Error;
 
 /// Pixels of a PNG, and units of an SVG: 20 by 12.5 cm at 300 per inch.
 const SIZE: (u32, u32) = (2400, 1500);
-/// How many of them are one unit of an SVG where it is shown.
+/// Pixels per unit of a shown SVG.
 const UNITS: u32 = 3;
 
-/// Known to SVG viewers as well.
+/// A family that SVG viewers know, too.
 pub const FONT: &str = "sans-serif";
 const FONT_SIZE: i32 = 54;
 const TITLE_SIZE: i32 = 66;
 const CAPTION_SIZE: i32 = 46;
 const GREY: RGBColor = RGBColor(90, 90, 90);
-/// Length of the marks at the numbers of an axis, and so the distance of the numbers.
+/// Length of the tick marks of an axis, which sets the distance of the numbers.
 const TICK_LENGTH: i32 = 18;
 const LINE_WIDTH: u32 = 5;
 const BAND_OPACITY: f64 = 0.2;
@@ -37,8 +37,8 @@ const SAMPLE: i32 = 110;
 const LEGEND_ROW: i32 = 70;
 const N_TICKS: usize = 8;
 
-/// The palette of Okabe and Ito, which colour-blind people can tell apart, without
-/// its yellow, which paper swallows; darker and lighter ones take turns.
+/// The palette of Okabe and Ito, which colour-blind people can distinguish, without
+/// yellow, which is invisible on paper. Dark and light colours alternate.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -60,7 +60,7 @@ impl Figure {
             let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
             self.draw(&area).map_err(internal)?;
         }
-        // Drawn finely, shown at the size of text.
+        // The drawing is fine; `width` and `height` set the shown size.
         let (width, height) = SIZE;
         Ok(svg.replacen(
             &format!("width=\"{width}\" height=\"{height}\""),
@@ -140,7 +140,7 @@ impl Figure {
         area.present()
     }
 
-    /// Draws title and caption; returns what is left.
+    /// Draws title and caption; returns the remaining area.
     fn draw_head<'a, B: DrawingBackend>(
         &self,
         area: Canvas<'a, B>,
@@ -162,13 +162,13 @@ impl Figure {
         Ok(rest)
     }
 
-    /// Of x all, of y a little more than what the bands cover.
+    /// The x axis covers all points, the y axis a little more than the bands.
     fn ranges(&self) -> (Range<f64>, Range<f64>) {
         let points = || self.curves.iter().flat_map(|curve| &curve.points);
         let x = extent(points().map(|point| point.x));
         let y = extent(points().flat_map(|point| [point.low, point.middle, point.high]));
         let room = 0.03 * (y.end - y.start);
-        // Nothing is gained by an axis that goes a little below zero.
+        // An axis that would go only a little below zero starts at zero.
         let start = if y.start >= 0.0 { (y.start - room).max(0.0) } else { y.start - room };
         (x, start..y.end + room)
     }
@@ -189,7 +189,7 @@ fn tick_step(range: &Range<f64>) -> f64 {
     (range.end - range.start) / N_TICKS as f64
 }
 
-/// A tick's number, with the digits that tell it from the next one.
+/// A tick's number, with enough digits to distinguish it from the next one.
 fn tick(value: f64, step: f64) -> String {
     let n_decimals = (-libm::log10(step).floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.n_decimals$}");
@@ -198,7 +198,7 @@ fn tick(value: f64, step: f64) -> String {
     if text == "-0" { "0".into() } else { text.into() }
 }
 
-/// How a curve is told from others.
+/// The line style of a curve.
 #[derive(Debug, Clone, Copy)]
 struct Style {
     colour: RGBColor,
@@ -206,7 +206,7 @@ struct Style {
 }
 
 impl Style {
-    /// As many as there can be curves.
+    /// One style for each possible curve.
     fn all() -> impl Iterator<Item = Self> {
         (0..CURVES_MAX).map(|index| Self {
             colour: COLOURS[index % COLOURS.len()],
@@ -215,7 +215,7 @@ impl Style {
     }
 }
 
-/// The curves' names above the plot, in as many rows as they need.
+/// The curves' names above the plot, in as many rows as necessary.
 struct Legend<'a> {
     rows: Vec<Vec<Entry<'a>>>,
 }
@@ -277,7 +277,7 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// Makes the font known, which the size of all texts is measured with.
+/// Registers the font, which measures the size of all texts.
 pub fn embed_font() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

@@ -1,4 +1,4 @@
-//! What a figure shows, as SVG and as PNG.
+//! The contents of a figure, as SVG and as PNG.
 
 use std::fs;
 
@@ -82,7 +82,7 @@ fn as_many_curves_as_are_allowed_differ_in_colour_or_dashes() {
     // The legend's samples, and the curves, straight lines both.
     let n_solid = svg.lines().filter(|line| line.contains(r#"stroke-width="5""#));
     let of_colour = |colour: &str| n_solid.clone().filter(|l| l.contains(colour)).count();
-    // A solid curve and a dashed one, which is of many pieces, and their samples.
+    // A solid curve, a dashed one of many pieces, and their samples.
     assert!(of_colour("#0072B2") > 20);
     let colours = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#000000", "#CC79A7"];
     assert!(colours.iter().all(|colour| of_colour(colour) == of_colour("#0072B2")));

@@ -1,4 +1,4 @@
-//! Which commands and options the pages of help show, and how wide they are.
+//! The commands and options of the pages of help, and their width.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use clap_complete::Shell;
 
 use super::*;
 
-/// What a command line prints as help.
+/// The help that a command line prints.
 pub fn printed(line: &str, width: usize) -> String {
     let line = line.split(' ').map(OsString::from).collect();
     let error = matches_of(line, Some(width)).unwrap_err();

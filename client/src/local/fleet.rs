@@ -28,13 +28,13 @@ pub struct Fleet {
     client_token: Token,
     workers: JoinSet<Result<(), WorkerError>>,
     shutdown: CancellationToken,
-    /// Ends what workers are still computing after `shutdown`.
+    /// Ends the items that workers still compute after `shutdown`.
     give_up: CancellationToken,
 }
 
 impl Fleet {
     /// Starts a coordinator on a free port and workers of one slot each. Random tokens
-    /// exclude the machine's other users. `web_listen`: where pages are served, if anywhere.
+    /// exclude the machine's other users. `web_listen`: the address of the pages, if any.
     pub async fn start(
         data_dir: &Path,
         n_workers: usize,
@@ -47,11 +47,11 @@ impl Fleet {
             Tokens::new(client_token.clone(), worker_token.clone()).expect("random tokens differ");
         let config = CoordinatorConfig {
             access: Access { tokens: Some(tokens), ..Access::default() },
-            // Nobody else has a token for it.
+            // No other program has a token for it.
             is_announced: false,
-            // Whoever computes one experiment here has not asked for the others.
+            // The user has started one experiment here, not the other unfinished ones.
             takes_up_unfinished: false,
-            // Whoever submits here owns the machine, too.
+            // The user who submits here also owns the machine.
             memory_budget: u64::MAX,
             web_listen,
             ..CoordinatorConfig::new(listen, data_dir.into())
@@ -82,7 +82,7 @@ impl Fleet {
         Connection::computing(&self.data_dir, self.coordinator.door().clone())
     }
 
-    /// Where its pages are, with what lets a browser in, if it serves any.
+    /// The address of its pages, with the token, if it serves any.
     pub fn pages(&self) -> Option<String> {
         let address = self.coordinator.web_addr()?;
         Some(login_address(address, &self.client_token))
@@ -105,7 +105,7 @@ impl Fleet {
             Some(Ok(Err(WorkerError::Threads(error)))) if self.workers.is_empty() => {
                 return Error::Starved(Starved::new(error));
             }
-            // Fewer workers compute the same.
+            // Fewer workers compute the same results.
             Some(Ok(Err(WorkerError::Threads(_)))) => return Box::pin(self.failure()).await,
             Some(Ok(Err(error))) => error.to_string(),
             Some(Err(error)) => error.to_string(),
@@ -114,12 +114,10 @@ impl Fleet {
         Error::Internal(format!("a worker ended: {reason}"))
     }
 
-    /// As [`Self::shutdown`]; says what it waits for if there was an interrupt.
+    /// Like [`Self::shutdown`]; after an interrupt, prints why it waits.
     pub async fn stop(self, result: &Result<(), Error>, progress: &Progress) {
         if matches!(result, Err(Error::Interrupted(_))) {
-            progress.remark(
-                "stopping when the running items are done; interrupt again to stop at once",
-            );
+            progress.remark("stopping after the running items; interrupt again to stop at once");
         }
         self.shutdown().await;
     }

@@ -1,5 +1,5 @@
-//! What needs a coordinator or workers in this process: `run`, and whatever works on a data
-//! directory. `without_local.rs` is in its place where they are left out.
+//! The coordinator and workers in this process, for `run` and for commands on a data
+//! directory. A build without them has `without_local.rs` instead.
 
 pub mod fleet;
 pub mod services;

@@ -5,8 +5,8 @@ pub use coordinator::{Door, InProcess};
 
 use crate::{Program, error::Error};
 
-/// The programs that this one can be instead. It contains all of their code, because `run` starts
-/// a coordinator and workers, so that a release is one file with three names.
+/// The other programs in this one. `run` needs the code of coordinator and worker anyway, so a
+/// release is one file with three names.
 pub const PROGRAMS: [(&str, Program); 2] =
     [("coordinator", coordinator::program::main), ("worker", worker::program::main)];
 
@@ -16,7 +16,7 @@ impl From<StartError> for Error {
     }
 }
 
-/// The error of opening a data directory to ask it.
+/// The error of opening a data directory to read it.
 pub fn refused(error: StartError) -> Error {
     match error {
         StartError::Store(error) => Error::from_store(&error),

@@ -1,4 +1,4 @@
-//! What happens to files that exist, and to files that are not finished.
+//! The treatment of existing and of unfinished files.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What is printed, and what is shown beside the bar.
+//! The printed output, and the text beside the bar.
 
 use std::sync::{Arc, Mutex};
 
@@ -35,8 +35,8 @@ impl Write for Captured {
     }
 }
 
-/// Standard output that takes nothing: its reader has gone, as with `| head`, or the disk
-/// is full.
+/// Standard output that fails: its reader has gone, as with `| head`, or the disk is
+/// full.
 struct Takes(io::ErrorKind);
 
 impl Write for Takes {
@@ -95,7 +95,7 @@ fn the_rest_takes_as_long_as_the_latest_generations() {
     }
     assert_eq!(progress.followed[&1].durations_ms.len(), ETA_WINDOW);
     assert_eq!(progress.followed[&1].durations_ms.front(), Some(&99));
-    // Of several, the last to end.
+    // Of several experiments, the last to end.
     let slow = GenerationSummary { duration_ms: 60_000, ..Default::default() };
     progress.generation(2, &slow).unwrap();
     assert_eq!(progress.remaining(), Duration::from_secs(999 * 60));

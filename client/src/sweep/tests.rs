@@ -1,4 +1,4 @@
-//! Sweeps: which runs arguments make, and what they refuse.
+//! Sweeps: the runs that arguments make, and refused arguments.
 
 use clap::Parser as _;
 

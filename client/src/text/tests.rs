@@ -88,7 +88,7 @@ fn the_end_has_state_fitness_champion_and_digest() {
          best of the first generation  0.500000\n  \
          mean of the last generation   0.456100\n  \
          champion                      1.250000, 95 % 1.000000 to 1.375000, on 200 new trials (individual 4 of generation 6)\n  \
-         champion, optimistic          1.500000 on the 50 trials by which it was selected\n  \
+         champion, optimistic          1.500000 on the 50 trials that selected it\n  \
          digest                        1a2b3c4d5e6f7a8b"
     );
     let unjudged = GetChampionResponse { judged: None, held_out: None, ..champion };

@@ -1,4 +1,4 @@
-//! What the comparison found, as numbers and as text.
+//! The result of a comparison, as numbers and as text.
 
 use serde::Serialize;
 use statistics::{
@@ -27,9 +27,9 @@ struct Quantity {
     /// For people.
     #[serde(skip)]
     title: String,
-    /// Whether less is better.
+    /// Whether smaller values are better.
     less_is_better: bool,
-    /// Fewest and most generations of a run that are averaged.
+    /// Smallest and largest number of averaged generations of a run.
     #[serde(skip_serializing_if = "Option::is_none")]
     averaged: Option<[u64; 2]>,
     samples: Vec<Summary>,
@@ -40,7 +40,7 @@ struct Quantity {
 #[derive(Debug, Serialize)]
 struct Summary {
     sample: String,
-    /// By ascending seed; what is infinite is null.
+    /// By ascending seed; infinite numbers are null.
     values: Vec<f64>,
     median: Interval,
     iqm: Interval,
@@ -142,7 +142,8 @@ impl Quantity {
             Column::number("runs").dropped(1),
             Column::number("median"),
             Column::number("95 %"),
-            // Without the IQM, its interval would be taken for another one's.
+            // The interval is left out before the IQM: alone, it would seem to belong to
+            // another number.
             Column::number("IQM").dropped(2),
             Column::number("95 %").dropped(3),
             Column::number("least").dropped(4),
@@ -205,7 +206,7 @@ impl Pair {
     }
 }
 
-/// A number, or that it is infinite.
+/// A number, or a word if it is infinite.
 fn number(value: f64, digits: usize) -> String {
     if value == f64::INFINITY { "never".into() } else { text::number(value, digits) }
 }
@@ -215,15 +216,15 @@ fn span(interval: &Interval, digits: usize) -> String {
     ends.map_or_else(|| "-".into(), |[low, high]| format!("{low} to {high}"))
 }
 
-/// Fewest and most generations of a run that are averaged if `last` are wanted; none without a
-/// history.
+/// Smallest and largest number of averaged generations of a run if `last` are requested; none
+/// without a history.
 fn averaged(samples: &[Sample], last: u64) -> Option<[u64; 2]> {
     let lengths = samples.iter().flat_map(Sample::histories).map(|history| history.len() as u64);
     let numbers: Vec<u64> = lengths.map(|length| length.min(last)).collect();
     Some([*numbers.iter().min()?, *numbers.iter().max()?])
 }
 
-/// "average of the last 50", or of as many as there are.
+/// "average of the last 50", or of all if there are fewer.
 fn spoken(averaged: Option<[u64; 2]>) -> String {
     match averaged {
         Some([1, 1]) => "the last one".into(),
@@ -251,7 +252,7 @@ fn generations_to(run: &RecordedRun, target: f64) -> Option<f64> {
     Some(reached.map_or(f64::INFINITY, |generation| (generation.generation + 1) as f64))
 }
 
-/// As [`generations_to`], in episodes; none if the history does not tell them.
+/// Like [`generations_to`], in episodes; none if the history lacks them.
 fn episodes_to(run: &RecordedRun, target: f64) -> Option<f64> {
     let mut episodes = 0;
     for generation in run.history.as_ref()? {

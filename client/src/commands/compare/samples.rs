@@ -20,7 +20,7 @@ use crate::{
     text,
 };
 
-/// Of which run a file is, has to be known.
+/// The error of a file whose run is unknown.
 const UNNAMED: &str = "expected a file NAME-SEED.csv or NAME-SEED.json, or a champion file that \
                        has its name in it";
 
@@ -32,32 +32,32 @@ pub struct Sample {
     pub runs: BTreeMap<u64, RecordedRun>,
 }
 
-/// What is known of a run.
+/// The known facts of a run.
 #[derive(Debug, Default)]
 pub struct RecordedRun {
     /// Its generations, if known.
     pub history: Option<Vec<GenerationFitness>>,
     /// Fitness of its champion on trials that selected nothing, if known.
     pub judged: Option<f64>,
-    /// What it was read from.
+    /// The file or experiment that it was read from.
     sources: Vec<String>,
 }
 
 impl Sample {
-    /// The histories that are known.
+    /// The known histories.
     pub fn histories(&self) -> impl Iterator<Item = &[GenerationFitness]> {
         self.runs.values().filter_map(|run| run.history.as_deref())
     }
 }
 
-/// Samples that are being read, in the order in which they are named.
+/// Samples while they are read, in the order of the command line.
 #[derive(Debug, Default)]
 pub struct Samples {
     samples: Vec<Sample>,
     problems: Vec<String>,
 }
 
-/// The part of a champion file that is compared.
+/// The compared part of a champion file.
 #[derive(Debug, Deserialize)]
 struct ChampionFile {
     #[serde(default)]
@@ -72,7 +72,7 @@ struct JudgedFile {
 }
 
 impl Samples {
-    /// Reads files; fails with all that is wrong with them.
+    /// Reads files; the error lists all their problems.
     pub fn read(&mut self, paths: &[PathBuf]) -> Result<(), Error> {
         for path in paths {
             if let Err(problem) = self.read_file(path) {
@@ -174,7 +174,7 @@ impl Samples {
     }
 }
 
-/// What the name of a file `NAME-SEED.ENDING` says of its run.
+/// The name and seed of a run, from the name of its file `NAME-SEED.ENDING`.
 fn name_and_seed(path: &Path) -> Option<(String, u64)> {
     let stem = path.file_stem()?.to_string_lossy();
     let (name, seed) = stem.rsplit_once('-')?;
@@ -185,8 +185,8 @@ fn twice(run: &RecordedRun) -> String {
     format!("the run is given twice: {}", run.sources.join(", "))
 }
 
-/// Runs of a group are a sample if they are of the same variant, others if their names are
-/// the same.
+/// Runs of a group form a sample if they are of the same variant, other runs if they have
+/// the same name.
 fn name(experiment: &Experiment) -> String {
     match (&*experiment.group, &*experiment.variant) {
         ("", _) => experiment.name.clone(),

@@ -1,4 +1,4 @@
-//! Which runs are compared with which, and what is said of them.
+//! The grouping of runs into samples, and the printed comparison.
 
 use std::fs;
 

@@ -17,15 +17,15 @@ use crate::{
 /// Evaluate a genotype: many trials under several conditions, every step measured.
 ///
 /// The trials are the same for every genotype and condition, and no evolution uses
-/// them. The nominal condition, which is the experiment file as it is, is always
-/// evaluated; the options below add more conditions. Measures and their statistics
-/// are written to a directory: steps.csv, trials.csv, summary.json. The files are
-/// the same, byte by byte, on any fleet.
+/// them. The command always evaluates the nominal condition, the unchanged experiment
+/// file; the options below add more conditions. The command writes measures and their
+/// statistics to a directory: steps.csv, trials.csv, summary.json. The files are the
+/// same, byte by byte, on any fleet.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = HELP)]
 pub struct EvaluateArgs {
-    /// Whom to evaluate, with the file of its experiment: ID or NAME, the champion; ID@G/I,
-    /// individual I of generation G; ID@G/mean, the mean of the distribution after it.
+    /// The genotype to evaluate, with the file of its experiment: ID or NAME, the champion;
+    /// ID@G/I, individual I of generation G; ID@G/mean, the mean of the distribution after it.
     #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments), required_unless_present = "genotype")]
     pub address: Option<NamedAddress>,
     /// File with the genotype, such as a champion file.
@@ -45,18 +45,19 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     pub robots: Vec<u32>,
     /// Add a condition with a perturbation: leader_failure, topology_switch,
-    /// uncontrollable_rotation or stimuli_inhibition. Parameters that are not given
-    /// keep their defaults.
+    /// uncontrollable_rotation or stimuli_inhibition. Other parameters keep their
+    /// defaults.
     #[arg(long, value_name = "NAME[:KEY=VALUE,...]")]
     pub perturb: Vec<String>,
-    /// Add a condition for each of these stimuli, in which the network gets zeros for
-    /// it. A stimulus is named by its key in the file or by its sensor, such as
+    /// Add a condition for each of these stimuli, in which the network receives zeros
+    /// instead. Name a stimulus by its key in the file or by its sensor, such as
     /// wireless_receiver:msg or msg.
     #[arg(long, value_name = "STIMULUS,...", value_delimiter = ',')]
     pub inhibit: Vec<String>,
     #[command(flatten)]
     pub set: SetArg,
-    /// As --set, with one value of each path, in all conditions, including the nominal one.
+    /// Like --set with one value per path, but for all conditions, including the nominal
+    /// one.
     #[arg(long, value_name = "PATH=VALUE[;...]")]
     pub base: Vec<String>,
     /// Write every K-th step, and the last one, to steps.csv.
@@ -71,7 +72,7 @@ pub struct EvaluateArgs {
     /// Number of workers of --local [default: the number of cores]
     #[arg(long, value_name = "N", requires = "local", value_parser = whole::<u16>(1..=1024))]
     pub workers: Option<u16>,
-    /// Directory of the results; created if it does not exist.
+    /// Directory of the results, created if missing.
     #[arg(long, value_name = "DIR")]
     pub to: PathBuf,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! Conditions: the experiment file as it is, and with changes.
+//! Conditions: the experiment file, unchanged and with changes.
 
 use experiment_file::{ConfigError, ExperimentConfig, suggestion};
 use indexmap::IndexMap;
@@ -12,7 +12,7 @@ use crate::{
     json,
 };
 
-/// Most conditions of one evaluation.
+/// Maximum number of conditions of one evaluation.
 const CONDITIONS_MAX: usize = 64;
 
 /// A variant of the experiment file under which a genotype is evaluated.
@@ -36,7 +36,7 @@ impl Condition {
         checked.map_err(|error| self.locate(misfit(error)))
     }
 
-    /// Names this condition in a refusal of it.
+    /// Adds the name of this condition to an error about it.
     pub fn locate(&self, error: Error) -> Error {
         match error {
             Error::Input(problem) => Error::Input(format!("condition {}: {problem}", self.name)),
@@ -44,7 +44,7 @@ impl Condition {
         }
     }
 
-    /// Number of robots that are evaluated.
+    /// Number of evaluated robots.
     pub fn n_robots(&self) -> u32 {
         let evolvable = &self.config.algorithm.evolvable_object;
         let mut robots = self.config.robots().filter(|(name, _)| name == evolvable);
@@ -52,7 +52,7 @@ impl Condition {
     }
 }
 
-/// All conditions that the arguments ask for, the nominal one first.
+/// All conditions that the arguments request, the nominal one first.
 pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>, Error> {
     let overrides = Overrides { steps: args.steps.steps, ..Overrides::default() };
     let compiled = file.compile(&overrides).map_err(|error| file.invalid(&error))?;
@@ -174,7 +174,7 @@ impl Nominal {
         Ok(vec![Change::new(path, Json::Object(params))])
     }
 
-    /// Inhibits a stimulus in all robots, in addition to what is inhibited already.
+    /// Inhibits a stimulus in all robots, in addition to earlier inhibitions.
     fn inhibition(&self, name: &str) -> Result<Vec<Change>, Error> {
         let stimuli = self.base.get(["topology", "stimuli"]).and_then(Json::object);
         let sensors: Vec<(&str, &str)> = stimuli
@@ -237,7 +237,7 @@ fn read(owner: &str, file: &Json) -> Result<ExperimentConfig, Error> {
     }
 }
 
-/// The problems without line numbers, which are not those of the user's file.
+/// The problems without line numbers, which would not match the user's file.
 fn problems(error: &ConfigError) -> String {
     let mut error = error.clone();
     error.problems.iter_mut().for_each(|problem| problem.line = None);

@@ -17,13 +17,12 @@ use crate::{
 /// The names of the files.
 pub const NAMES: [&str; 3] = ["steps.csv", "trials.csv", "summary.json"];
 
-/// The files while they are written: an evaluation that is interrupted leaves everything as it
-/// was.
+/// The files while they are written: an interrupted evaluation leaves everything unchanged.
 pub struct Results(OutputFiles);
 
 impl Results {
-    /// Refuses a directory that cannot be written, and, unless they are to be
-    /// replaced, one that has such files.
+    /// Refuses a directory that cannot be written, and, without `--force`, one that
+    /// already has such files.
     pub fn begin(to: &Path, overwrite: Overwrite) -> Result<Self, Error> {
         Ok(Self(overwrite.begin_files(to, &NAMES)?))
     }
@@ -64,8 +63,8 @@ impl Results {
         self.write_table("steps.csv", &header, &rows)
     }
 
-    /// Writes trials.csv: per trial its fitness, and the mean over the steps and the last
-    /// value of each measure, with every digit.
+    /// Writes trials.csv: for each trial the fitness, and the mean over the steps and the
+    /// last value of each measure, with every digit.
     pub fn write_trials(
         &self,
         conditions: &[Condition],
@@ -115,7 +114,7 @@ impl Results {
 /// The shortest number that agrees in six significant digits.
 fn six_digits(value: f64) -> String {
     let rounded: f64 = format!("{value:.5e}").parse().expect("a number was just written");
-    // Rust writes no exponents: nothing here is so small that this matters.
+    // Rust writes no exponents; no value here is small enough to need one.
     rounded.to_string()
 }
 

@@ -11,7 +11,7 @@ use crate::{
     error::{Error, is_transient},
 };
 
-/// An attempt that lasted so long counts as contact with the coordinator.
+/// An attempt of at least this duration counts as contact with the coordinator.
 const LASTING: Duration = Duration::from_secs(10);
 
 /// All trials of a condition.
@@ -55,8 +55,8 @@ impl Measured {
     }
 }
 
-/// Sends the request until there is an answer. A coordinator that restarts forgets the
-/// request, so it is sent again, and gives the same answer.
+/// Sends the request until the coordinator answers. A restarted coordinator has forgotten
+/// the request; a repeated request gives the same answer.
 pub async fn ask(connection: &Connection, request: EvaluateRequest) -> Result<Measured, Error> {
     let mut backoff = backoff();
     let mut unreachable_since = None;
@@ -67,8 +67,7 @@ pub async fn ask(connection: &Connection, request: EvaluateRequest) -> Result<Me
             Err(status) => status,
         };
         let now = Instant::now();
-        // Patience is about how long the coordinator is unreachable, not about how long it
-        // computes.
+        // Patience limits the time without contact, not the time of computing.
         if now - asked > LASTING {
             backoff.reset();
             unreachable_since = None;
@@ -109,7 +108,7 @@ fn checked(
     let is_whole = |(number, trial): (u32, &MeasuredTrial)| {
         trial.trial == number && trial.values.len() == n_values
     };
-    // A script may measure nothing; an answer without a task has no steps.
+    // A script may have no measures; an answer without a task has no steps.
     if trials.len() != n_trials as usize || steps == 0 || !(0..).zip(&trials).all(is_whole) {
         return Err(Error::Internal("the coordinator's answer is incomplete".into()));
     }

@@ -1,4 +1,4 @@
-//! The summary: what was evaluated, and estimates of its fitness and measures.
+//! The summary: the subject of an evaluation, and estimates of its fitness and measures.
 
 use experiment_file::Seed;
 use indexmap::IndexMap;
@@ -15,7 +15,7 @@ use super::{
     statistics::{Estimate, mean},
 };
 
-/// What was evaluated.
+/// The evaluated genotype and experiment.
 #[derive(Debug, Clone, Serialize)]
 pub struct Subject {
     name: String,
@@ -71,14 +71,14 @@ pub struct ConditionSummary {
     changes: IndexMap<String, Json>,
     robots: u32,
     pub fitness: Estimate,
-    /// Per name, the measures that have a value.
+    /// The measures that have a value, by name.
     pub metrics: IndexMap<String, MetricSummary>,
 }
 
 /// The results of one measure.
 #[derive(Debug, Clone, Serialize)]
 pub struct MetricSummary {
-    /// Absent of the measures of a script, which does not say.
+    /// Absent for the measures of a script, which declares no unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     unit: Option<&'static str>,
     /// Estimate of the mean over the steps.
@@ -137,13 +137,13 @@ fn metrics(measured: &Measured) -> IndexMap<String, MetricSummary> {
     measured.metrics.iter().enumerate().filter_map(summary).collect()
 }
 
-/// Mean of a measure over the steps of a trial that have it.
+/// Mean of a measure over the steps of a trial that have a value.
 pub fn time_mean(measured: &Measured, trial: usize, metric: usize) -> Option<f64> {
     let values: Vec<f64> = measured.course(trial, metric).filter(|value| !value.is_nan()).collect();
     mean(&values)
 }
 
-/// What a measure of a built-in task counts in, and whether it is a share of something.
+/// The unit of a measure of a built-in task, and whether it is a share.
 fn unit(metric: &str) -> (Option<&'static str>, bool) {
     match metric {
         "leaders" => (Some("robots"), false),

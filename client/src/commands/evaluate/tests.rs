@@ -1,4 +1,4 @@
-//! Conditions, statistics and files of an evaluation, and how it is asked for.
+//! Conditions, statistics and files of an evaluation, and its arguments.
 
 use std::{fs, path::PathBuf};
 
@@ -56,7 +56,7 @@ fn the_nominal_condition_is_the_file() {
     let compiled = file.compile(&Overrides::default()).unwrap();
     assert_eq!(conditions.len(), 1);
     assert_eq!(conditions[0].name, "nominal");
-    // The order of the keys, too: genes stand in it.
+    // The order of the keys matters, too: it is the order of the genes.
     let canonical = conditions[0].config.to_canonical_json();
     assert_eq!(canonical, compiled.config.to_canonical_json());
 }
@@ -86,7 +86,7 @@ fn what_is_inhibited_is_so_beside_what_has_been() {
         let expected = json!([light, all]);
         assert_eq!(robots(condition)["perturbations"]["stimuli_inhibition"], expected);
     }
-    // Where nothing is inhibited, it stands alone.
+    // Without other inhibitions, the list has this stimulus alone.
     let args = EvaluateArgs { inhibit: strings(&["state"]), ..args };
     let conditions = conditions("leader_selection_snes", &args).unwrap();
     let inhibition = &robots(&conditions[1])["perturbations"]["stimuli_inhibition"];
@@ -133,7 +133,7 @@ fn changes_make_a_condition_or_all_of_them() {
         assert_eq!((&config["world"]["height"], &config["seed"]), (&json!(2000.0), &json!(7)));
         assert_eq!(config["algorithm"]["evaluation_steps"], 50);
     }
-    // What changed everywhere is told of the nominal condition alone.
+    // Changes of all conditions are listed for the nominal condition alone.
     let paths = [0, 1].map(|index| {
         let changes = conditions[index].changes.iter();
         changes.map(|change| change.path.clone()).collect::<Vec<_>>()

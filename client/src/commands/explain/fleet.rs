@@ -1,4 +1,4 @@
-//! What the whole fleet does, and what its experiments wait for.
+//! The state of the whole fleet, and the reasons why its experiments wait.
 
 use serde::Serialize;
 use swarm_proto::v1::{
@@ -20,7 +20,7 @@ struct Fleet<'a> {
     experiments: Vec<Explanation<'a>>,
 }
 
-/// An evaluation that somebody waits for, as JSON.
+/// An unfinished evaluation, as JSON.
 #[derive(Debug, Serialize)]
 struct Evaluation<'a> {
     name: &'a str,
@@ -44,7 +44,7 @@ impl<'a> From<&'a RunningEvaluation> for Evaluation<'a> {
     }
 }
 
-/// What an evaluation waits for, and what to do about it.
+/// The reason why an evaluation waits, with the next steps.
 fn evaluation_lines(evaluation: &RunningEvaluation, n_workers: usize, address: &str) -> String {
     let RunningEvaluation { name, episodes, episodes_left, .. } = evaluation;
     let done = episodes.saturating_sub(*episodes_left);
@@ -63,14 +63,12 @@ fn evaluation_lines(evaluation: &RunningEvaluation, n_workers: usize, address: &
             lines.push("  -> see why: swarmctl workers --output wide".to_owned());
         }
         lines.push(format!("  -> start some: worker --coordinator {address}"));
-        lines.push(
-            "  -> or compute it where it was asked for: swarmctl evaluate --local".to_owned(),
-        );
+        lines.push("  -> or compute it without workers: swarmctl evaluate --local".to_owned());
     }
     lines.join("\n")
 }
 
-/// Explains every experiment that has not ended. What holds for all is said once.
+/// Explains every unfinished experiment. Prints findings about the whole fleet once.
 pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
     let request = ListWorkersRequest {};
     let answer = connection.call_fleet(async |client| client.list_workers(request).await).await?;
@@ -112,7 +110,7 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
     }];
     let lines = |evaluation| evaluation_lines(evaluation, workers.len(), connection.address());
     sections.extend(evaluations.iter().map(lines));
-    // With an experiment, what the workers are for is known: only then they may be too few.
+    // Findings about the fleet come from experiments: without any, no workers are needed.
     let mut of_fleet: Vec<String> = Vec::new();
     let mut of_experiments = Vec::new();
     for (answer, findings) in &explained {

@@ -1,8 +1,8 @@
-//! How many workers a fleet needs, and which jobs to submit and to end for it.
+//! The number of workers that a fleet needs, and the jobs to submit and to end.
 //!
-//! The rule is that of Kubernetes' autoscaler, with the numbers of
-//! `docs/deploy/kubernetes/autoscaler.yaml`: the same queue makes the same fleet. Time is an
-//! argument.
+//! The rule and its numbers are those of Kubernetes' autoscaler in
+//! `docs/deploy/kubernetes/autoscaler.yaml`: the same queue gives the same number of
+//! workers. Time is an argument.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -10,10 +10,10 @@ use tokio::time::Instant;
 
 /// Open items for each worker.
 pub const ITEMS_PER_WORKER: u64 = 16;
-/// More workers are wanted once the queue has been long for this time.
+/// The fleet grows once the queue has been long for this time.
 pub const UP_WINDOW: Duration = Duration::from_secs(30);
-/// Fewer are wanted once it has been short for this time: at the end of every generation no
-/// item is left, and the number of workers does not follow that.
+/// The fleet shrinks once the queue has been short for this time. It is longer than the end
+/// of a generation, when no item is left.
 pub const DOWN_WINDOW: Duration = Duration::from_secs(600);
 
 /// Bounds of the number of workers.
@@ -24,11 +24,12 @@ pub struct Bounds {
     pub max: u32,
 }
 
-/// Decides how many workers are wanted.
+/// Decides the number of workers.
 #[derive(Debug)]
 pub struct Autoscaler {
     bounds: Bounds,
-    /// What the queue alone would have wanted, and when, oldest first; of [`DOWN_WINDOW`].
+    /// The numbers of workers that the queue alone required within [`DOWN_WINDOW`], with
+    /// their times, oldest first.
     recent: VecDeque<(Instant, u32)>,
 }
 
@@ -37,7 +38,7 @@ impl Autoscaler {
         Self { bounds, recent: VecDeque::new() }
     }
 
-    /// The number of workers wanted, of which there are `n_workers` now. `n_items`: items of
+    /// The required number of workers; `n_workers`: the present number; `n_items`: items of
     /// running experiments that wait or are computed.
     pub fn wanted(&mut self, now: Instant, n_items: u64, n_workers: u32) -> u32 {
         let Bounds { min, max } = self.bounds;
@@ -50,7 +51,7 @@ impl Autoscaler {
             |window| self.recent.iter().filter(move |(at, _)| now - *at <= window).map(|(_, n)| *n);
         let up = recent(UP_WINDOW).min().unwrap_or(min);
         let down = recent(DOWN_WINDOW).max().unwrap_or(max);
-        // Whatever the queue says, the bounds hold.
+        // The bounds take precedence over the queue.
         n_workers.max(up).min(down).clamp(min, max)
     }
 }
@@ -59,24 +60,24 @@ impl Autoscaler {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Job {
     pub id: String,
-    /// Whether it has a node; else it waits for one.
+    /// Whether the job has a node; otherwise it waits for one.
     pub is_running: bool,
 }
 
-/// What to do about jobs.
+/// The jobs to submit and to end.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Plan {
     /// Number of jobs to submit.
     pub n_submit: u32,
-    /// Jobs to take out of the queue.
+    /// Waiting jobs to withdraw from the queue.
     pub withdraw: Vec<String>,
-    /// Jobs whose workers are to finish their items.
+    /// Running jobs whose workers should finish their items and end.
     pub finish: Vec<String>,
 }
 
 impl Plan {
-    /// What leads from these jobs, oldest first, to as many as are wanted. Jobs that wait go
-    /// before those that run, the newest first.
+    /// The plan that leads from these jobs, oldest first, to the required number. It ends
+    /// waiting jobs before running ones, the newest first.
     pub fn new(jobs: &[Job], n_wanted: u32) -> Self {
         let n_wanted = n_wanted as usize;
         let n_submit = n_wanted.saturating_sub(jobs.len()) as u32;

@@ -10,7 +10,7 @@ use crate::{error::Error, text};
 /// Worker jobs of one fleet in Slurm.
 #[derive(Debug)]
 pub struct Slurm {
-    /// By which the jobs of this fleet are known.
+    /// The name that identifies the jobs of this fleet.
     pub job_name: String,
     /// The worker's command line, for a shell.
     pub script: String,
@@ -28,7 +28,7 @@ impl Slurm {
         Ok(parse_jobs(&call("squeue", arguments).await?))
     }
 
-    /// Submits and ends jobs. Returns the numbers of those that were submitted.
+    /// Submits and ends jobs. Returns the numbers of the submitted jobs.
     pub async fn carry_out(&self, plan: &Plan) -> Result<Vec<String>, Error> {
         let mut submitted = Vec::new();
         for _ in 0..plan.n_submit {
@@ -44,9 +44,9 @@ impl Slurm {
             let id = answer.trim().split(';').next().unwrap_or_default();
             submitted.push(id.to_owned());
         }
-        // One that begins to run meanwhile stays, and is seen the next time.
+        // A job that begins to run meanwhile stays; the next check handles it.
         cancel(&["--state=PENDING"], &plan.withdraw).await?;
-        // The worker, which is what is left of the script, finishes its items.
+        // The script has replaced itself by the worker, which finishes its items.
         cancel(&["--batch", "--signal=TERM"], &plan.finish).await?;
         Ok(submitted)
     }
@@ -96,7 +96,7 @@ async fn call(
     Ok(String::from_utf8_lossy(&stdout).into_owned())
 }
 
-/// Reads lines of `NUMBER STATE`. Jobs that are about to end count no more.
+/// Reads lines of `NUMBER STATE`. Leaves out jobs that are about to end.
 fn parse_jobs(text: &str) -> Vec<Job> {
     let job = |line: &str| {
         let (id, state) = line.trim().split_once(' ')?;

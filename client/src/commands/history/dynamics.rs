@@ -1,4 +1,4 @@
-//! How evolution moved, as a table.
+//! The movement of evolution, as a table.
 
 use serde::Serialize;
 use swarm_proto::v1::{Experiment, GenerationDynamics};
@@ -24,13 +24,13 @@ const CSV_KEYS: [&str; 10] = [
     "rank_correlation",
 ];
 
-/// What a generation did; null where the algorithm has no distribution.
+/// The movement of a generation; null if the algorithm has no distribution.
 #[derive(Debug, Serialize)]
 struct Record {
     experiment: u64,
     generation: u64,
     mean_step: Option<f64>,
-    /// Length of the way of the mean up to here.
+    /// Length of the way of the mean up to this generation.
     mean_path: Option<f64>,
     deviation_min: Option<f64>,
     deviation_q1: Option<f64>,
@@ -40,7 +40,7 @@ struct Record {
     rank_correlation: Option<f64>,
 }
 
-/// Prints how the experiments moved.
+/// Prints the movement of experiments.
 pub async fn print(
     experiments: &[Experiment],
     connection: &Connection,

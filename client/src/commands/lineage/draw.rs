@@ -10,7 +10,7 @@ use crate::text;
 /// Ancestors by generation and index.
 type Ancestors<'a> = BTreeMap<(u64, u32), &'a Ancestor>;
 
-/// A tree per population: the individual, under it its parents, under those theirs.
+/// A tree per population: below each individual are its parents.
 pub fn trees(populations: &[PopulationLineage], experiment: u64) -> String {
     let mut lines = Vec::new();
     for PopulationLineage { population, ancestors } in populations {
@@ -32,14 +32,15 @@ pub fn trees(populations: &[PopulationLineage], experiment: u64) -> String {
 struct Tree<'a> {
     experiment: u64,
     all: Ancestors<'a>,
-    /// Those whose parents are in the tree already.
+    /// Individuals whose parents are already in the tree.
     shown: BTreeSet<(u64, u32)>,
     lines: Vec<String>,
 }
 
 impl Tree<'_> {
-    /// Adds an ancestor and its own. `before`: what stands before all their lines; `branch`,
-    /// `below`: what follows that in its own line, and in those of its ancestors.
+    /// Adds an individual and its ancestors. `before`: the prefix of all their lines;
+    /// `branch` and `below`: the text after that prefix in its own line, and in those of its
+    /// ancestors.
     fn grow(&mut self, of: &Ancestor, before: String, branch: &str, below: &str) {
         let place = (of.generation, of.individual);
         let is_new = self.shown.insert(place);

@@ -1,4 +1,4 @@
-//! Which experiments a list has, and in which order.
+//! The experiments of a list, and their order.
 
 use std::cmp::{Ordering, Reverse};
 
@@ -8,25 +8,26 @@ use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
 use crate::{complete, text};
 
-/// Which experiments to list, and in which order.
+/// The experiments to list, and their order.
 #[derive(Debug, Default, Args)]
 pub struct Filter {
-    /// Only those in this state, or one of these.
+    /// List only experiments in this state, or in one of several.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "STATE")]
     state: Vec<State>,
-    /// Only those with this label, with any value or with this one; of several all.
+    /// List only experiments with this label, with any value or with this one. If repeated,
+    /// an experiment must have all of them.
     #[arg(long, value_name = "KEY[=VALUE]", add = ArgValueCompleter::new(complete::labels))]
     label: Vec<String>,
-    /// Those that are archived, too.
+    /// Include archived experiments.
     #[arg(long)]
     all: bool,
-    /// Order: best begins with the largest fitness, age with the newest, eta with those that
-    /// end first.
+    /// Order: best puts the largest fitness first, age the newest experiment, eta the next
+    /// to end.
     #[arg(long, value_enum, default_value_t, value_name = "COLUMN")]
     sort: Sort,
 }
 
-/// A state, as people name it.
+/// A state, as written on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum State {
     Running,
@@ -36,7 +37,7 @@ enum State {
     Cancelled,
 }
 
-/// By what a list is ordered; equal ones by their numbers.
+/// The sort key of a list; ties are ordered by number.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 enum Sort {
     #[default]
@@ -61,7 +62,7 @@ impl From<State> for ExperimentState {
 }
 
 impl Filter {
-    /// Which experiments they are; `named`: the name of a group, or of an experiment.
+    /// The experiments to list; `named`: the name of a group, or of an experiment.
     pub fn wanted(&self, named: Option<String>) -> ListExperimentsRequest {
         ListExperimentsRequest {
             named: named.unwrap_or_default(),
@@ -72,7 +73,7 @@ impl Filter {
         }
     }
 
-    /// Brings experiments that come in the order of their numbers into the wanted one.
+    /// Sorts experiments, which arrive in the order of their numbers.
     pub fn sort(&self, experiments: &mut [Experiment]) {
         experiments.sort_by(|a, b| self.sort.compare(a, b));
     }
@@ -84,7 +85,7 @@ impl Sort {
             Self::Id => Ordering::Equal,
             Self::Name => a.name.cmp(&b.name),
             Self::State => a.state.cmp(&b.state),
-            // What is not known comes last.
+            // Unknown values come last.
             Self::Best => descending(best(a), best(b)),
             Self::Age => Reverse(a.submitted_at_ms).cmp(&Reverse(b.submitted_at_ms)),
             Self::Eta => {
@@ -95,7 +96,7 @@ impl Sort {
     }
 }
 
-/// What the champion is worth, or else the fitness by which it was selected.
+/// The champion's judged fitness, or else the fitness that selected it.
 fn best(experiment: &Experiment) -> Option<f64> {
     experiment.champion_fitness.or(experiment.champion_selection_fitness)
 }

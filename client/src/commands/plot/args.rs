@@ -7,7 +7,7 @@ use clap_complete::ArgValueCompleter;
 
 use crate::{complete, output_file::Overwrite};
 
-/// Draw the fitness of runs against their generations.
+/// Draw the fitness of runs over their generations.
 ///
 /// One curve per run: the mean over the individuals of each generation, in a band
 /// from the worst to the best of them. The same runs give the same file, byte by

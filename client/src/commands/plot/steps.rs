@@ -1,4 +1,4 @@
-//! Curves of an evaluation: a measure against the step, per condition.
+//! Curves of an evaluation: a measure over the steps, per condition.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::{
     file_kind::{self, Kind},
 };
 
-/// The columns of `steps.csv` that are drawn.
+/// The drawn columns of `steps.csv`.
 #[derive(Debug, Deserialize)]
 struct Row {
     condition: String,
@@ -23,8 +23,9 @@ struct Row {
     q3: f64,
 }
 
-/// The median of a measure between its quartiles, per condition of the evaluation in
-/// a directory. No measure need be named if there is only one; no conditions are all.
+/// The median of a measure between its quartiles, per condition of the evaluation in a
+/// directory. The measure may be omitted if there is only one. An empty list of
+/// conditions means all.
 pub fn figure(dir: &Path, metric: Option<&str>, conditions: &[String]) -> Result<Figure, Error> {
     file_kind::expect(dir, &[Kind::EvaluationDirectory], "the directory of an evaluation")
         .map_err(|what| Error::Input(format!("{}: {what}", dir.display())))?;

@@ -1,4 +1,4 @@
-//! Where the curves of a figure come from, and what is refused.
+//! The sources of the curves of a figure, and refused arguments.
 
 use std::{fs, path::PathBuf};
 
@@ -14,8 +14,8 @@ use crate::{
 
 /// An address without a server.
 const NOWHERE: &str = "http://127.0.0.1:1";
-/// As `history` writes them, with columns that are not drawn, and a fitness that is
-/// not finite.
+/// Files in the format of `history`, with columns that are not drawn, and a fitness that
+/// is not finite.
 const HISTORY: &str = "\
 experiment,generation,best,mean,min,digest
 3,0,0.5,0.25,0,ab
@@ -30,7 +30,7 @@ fn csv(dir: &tempfile::TempDir, name: &str, text: &str) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// Plots to `to` and returns what is printed.
+/// Plots to `to` and returns the output.
 async fn run(coordinator: &str, runs: &[&str], to: PathBuf) -> Result<String, Error> {
     let captured = Captured::default();
     let settings = Settings { coordinator: Some(coordinator.into()), ..Settings::default() };
@@ -104,8 +104,8 @@ async fn what_is_no_history_is_refused_in_one_line() {
     let dir = tempfile::tempdir().unwrap();
     let header = "experiment,generation,best,mean,min,digest\n";
     for (text, expected) in [
-        ("", "there is no generation with a fitness"),
-        (header, "there is no generation with a fitness"),
+        ("", "it has no generation with a fitness"),
+        (header, "it has no generation with a fitness"),
         ("a,b\n1,2\n", "missing field `generation`"),
         ("generation,best,mean,min\n0,1,2,x\n", "line 2"),
         ("generation,best,mean,min\n0,1,2\n", "history ID --output csv"),

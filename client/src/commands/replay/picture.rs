@@ -19,23 +19,24 @@ use self::{
 };
 use crate::{args::whole, error::Error};
 
-/// Side of a picture, and of an animation, of which 100 frames are to stay below 1 MB, pixels.
+/// Side of a picture and of an animation, pixels. 100 frames of an animation should stay below
+/// 1 MB.
 const SIDE: u32 = 800;
 const SIDE_OF_ANIMATIONS: u32 = 480;
 /// Most steps of an animation.
 const FRAMES_MAX: usize = 2_000;
 /// Steps per second of an animation.
 const PACE: u16 = 20;
-/// Steps of the way behind a robot.
+/// Steps of the trail behind a robot.
 const TRAIL: usize = 60;
-/// Pixels along a side that are drawn for each one of a picture, which is their mean: edges are
-/// smooth. An animation, which has many pictures, is drawn less finely.
+/// Drawn pixels along a side for each pixel of a picture, which is their mean: this smooths
+/// edges. Animations have many pictures, so they are drawn less finely.
 const FINE: u32 = 3;
 const FINE_OF_ANIMATIONS: u32 = 2;
-/// Frames whose colours an animation has.
+/// Number of frames from which the colours of an animation are chosen.
 const SAMPLED: usize = 8;
 
-/// How a picture is written.
+/// The options of a picture.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct PictureArgs {
     /// Step that a .png or .svg shows; FIRST..LAST, both included, makes an animated .png
@@ -45,7 +46,7 @@ pub struct PictureArgs {
     /// Width and height of a picture, in pixels [default: 800; of an animated one 480]
     #[arg(long, value_name = "PIXELS", requires = "to", value_parser = whole(100..=4000u32))]
     pub size: Option<u32>,
-    /// How many of them a .png says are an inch [default: 300]
+    /// Pixels per inch that a .png states [default: 300]
     #[arg(long, value_name = "N", requires = "to", value_parser = whole(30..=2400u32))]
     pub dpi: Option<u32>,
 }
@@ -76,7 +77,7 @@ pub struct Moments {
 impl FromStr for Moments {
     type Err = String;
 
-    /// Reads `120` and `0..299`, of which both ends belong to it.
+    /// Reads `120` and `0..299`, both ends included.
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |text: &str| {
             text.parse::<u32>().map_err(|_| format!("`{text}` is not a step, a number from 0"))
@@ -92,7 +93,7 @@ impl FromStr for Moments {
     }
 }
 
-/// What is drawn: some steps of an episode.
+/// Some steps of an episode, to be drawn.
 struct Shown<'a> {
     config: &'a ExperimentConfig,
     steps: &'a [StepRecord],
@@ -122,7 +123,7 @@ impl<'a> Shown<'a> {
         Camera::around(self.config, &self.steps[self.range.clone()], side)
     }
 
-    /// A step, and those before it that lead there.
+    /// A step, and the steps of its trail.
     fn way(&self, step: usize) -> &'a [StepRecord] {
         &self.steps[step.saturating_sub(TRAIL)..=step]
     }
@@ -147,12 +148,12 @@ pub fn svg(
         draw::draw(&area, fine, &camera, &discs, shown.way(*shown.range.end()))
             .map_err(internal)?;
     }
-    // Drawn finely, shown at the size that is wanted.
+    // The drawing is fine; `width` and `height` set the shown size.
     let sizes = [fine, side].map(|side| format!("width=\"{side}\" height=\"{side}\""));
     Ok(text.replacen(&sizes[0], &sizes[1], 1).into_bytes())
 }
 
-/// The PNG of some of an episode's steps; of the last one if none are named.
+/// The PNG of some steps of an episode; without steps, of the last one.
 pub fn png(
     config: &ExperimentConfig,
     steps: &[StepRecord],
@@ -199,7 +200,7 @@ pub fn png(
     Ok(bytes)
 }
 
-/// A picture of the last of some steps, drawn `times` as finely as it has pixels.
+/// A picture of the last of some steps, drawn with `times` as many pixels along a side.
 fn smooth(
     side: u32,
     times: u32,

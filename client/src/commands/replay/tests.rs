@@ -1,4 +1,4 @@
-//! Files that are written, and what is refused before one is.
+//! Written files, and arguments that are refused before any is written.
 
 use std::fs;
 

@@ -6,7 +6,7 @@ use swarm_telemetry::EscapingWriter;
 
 use crate::progress::BesideBar;
 
-/// Logs warnings and errors, on lines of their own.
+/// Logs warnings and errors, each on its own line.
 pub fn init(stderr: impl Fn() -> BesideBar + Send + Sync + 'static) {
     tracing_subscriber::fmt()
         .with_max_level(LevelFilter::WARN)
@@ -14,9 +14,9 @@ pub fn init(stderr: impl Fn() -> BesideBar + Send + Sync + 'static) {
         .with_ansi(false)
         .with_target(false)
         .without_time()
-        // It would panic if standard error is closed.
+        // The default writer would panic if standard error is closed.
         .log_internal_errors(false)
-        // Of two commands in one process, the first has set it up.
+        // If two commands run in one process, the first one has set the log up.
         .try_init()
         .unwrap_or_default();
 }

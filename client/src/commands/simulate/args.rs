@@ -18,22 +18,22 @@ use crate::{
 
 /// Simulate single trials here, and show the fitness and measures of a genotype.
 ///
-/// They are the same, bit for bit, as in evolution: a champion in the worlds of its
-/// generation gets the fitness that is stored with it.
+/// The results equal those of evolution, bit for bit: in the worlds of its generation, a
+/// champion gets its stored fitness.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = HELP)]
 pub struct SimulateArgs {
-    /// The experiment file; or an address, which is simulated with the file of its experiment,
-    /// in the worlds of its generation: ID or NAME, the champion; ID@G/I, individual I of
-    /// generation G; ID@G/mean, the mean of the distribution after it.
+    /// The experiment file; or a genotype, which is simulated with the file of its experiment, in
+    /// the worlds of its generation: ID or NAME, the champion; ID@G/I, individual I of generation
+    /// G; ID@G/mean, the mean of the distribution after it.
     #[arg(value_name = "CONFIG|ADDRESS", add = ArgValueCompleter::new(complete::experiments_and_files))]
     pub subject: PathBuf,
     /// File with the genotype: a JSON list of genes, or an object with a `genotype`,
     /// such as a champion file.
     ///
-    /// Without this option, without --experiment and without an address, genes are drawn uniformly from
-    /// the streams (seed, generation 0, trial 0, evolution, population), as those of
-    /// the first individual of a GA.
+    /// Without this option, --experiment or an address, the command draws uniform genes from the
+    /// streams (seed, generation 0, trial 0, evolution, population), as for the first individual
+    /// of a GA.
     #[arg(long, value_name = "FILE", group = FOREIGN, conflicts_with = "experiment")]
     pub genotype: Option<PathBuf>,
     /// Use a genotype of an experiment: ID or NAME, the champion; ID@G/I, individual I of
@@ -44,7 +44,7 @@ pub struct SimulateArgs {
     pub changed: ChangedArg,
     #[command(flatten)]
     pub seed: SeedArg,
-    /// Generation, from 0, whose worlds to simulate [default: that of the address; 0 for an
+    /// Generation of the worlds to simulate, from 0 [default: that of the address; 0 for an
     /// experiment file]
     #[arg(long, value_name = "G", value_parser = whole(0..=u64::MAX))]
     pub generation: Option<u64>,
@@ -77,7 +77,7 @@ pub struct SimulateArgs {
     /// The last three kinds of columns are the same for all robots of a step.
     #[arg(long, value_name = "FILE", verbatim_doc_comment)]
     pub trace: Option<PathBuf>,
-    /// More columns of the trace, at the end of its rows.
+    /// Additional columns of the trace, after the others.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "COLUMNS", requires = "trace")]
     pub trace_columns: Vec<ExtraColumns>,
     #[command(flatten)]
@@ -100,7 +100,7 @@ impl SimulateArgs {
         Overrides { seed, steps, trials, ..Overrides::default() }
     }
 
-    /// The address of whom to simulate, if the subject is not a file.
+    /// The address of the genotype to simulate, unless the subject is a file.
     pub fn address(&self) -> Option<NamedAddress> {
         let address = self.subject.to_str()?.parse().ok();
         address.filter(|_| !self.subject.exists())

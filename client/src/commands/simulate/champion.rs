@@ -1,4 +1,4 @@
-//! A genotype says in what experiment it was evolved; here it meets an experiment file.
+//! Checks that a genotype evolved under the experiment file that it is used with.
 
 use evolution::Digest;
 use experiment_file::Seed;
@@ -12,10 +12,10 @@ use crate::{
     experiment_file::{ExperimentFile, Overrides},
 };
 
-/// Characters of a digest that tell configurations apart for people.
+/// Characters of a digest that messages show.
 const SHOWN: usize = 12;
 
-/// In what a genotype was evolved.
+/// The experiment in which a genotype evolved.
 #[derive(Debug, PartialEq, Eq, Deserialize)]
 pub struct Origin {
     config_digest: String,
@@ -26,7 +26,8 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// What a file with a genotype says of it; none if it says nothing, as a list of genes.
+    /// The experiment that a file with a genotype states; none if it states none, like a
+    /// list of genes.
     pub fn of_file(file: &Value) -> Result<Option<Self>, serde_json::Error> {
         match file.get("config_digest") {
             None | Some(Value::Null) => Ok(None),
@@ -34,7 +35,8 @@ impl Origin {
         }
     }
 
-    /// That of an experiment's genotypes; none if its coordinator does not say.
+    /// The experiment of a coordinator's genotypes; none if the coordinator does not
+    /// state it.
     pub fn of_experiment(experiment: &Experiment) -> Option<Self> {
         let Experiment { config_digest, name, seed, simulation, .. } = experiment.clone();
         let simulation = Some(simulation).filter(|simulation| !simulation.is_empty());
@@ -42,8 +44,8 @@ impl Origin {
         Some(origin).filter(|origin| !origin.config_digest.is_empty())
     }
 
-    /// Refuses an experiment file, as it is and with the genotype's seed, that is another
-    /// experiment than the genotype's, unless that is wanted. `genotype`: where it comes from.
+    /// Refuses an experiment file that, with the genotype's seed, is another experiment than
+    /// the genotype's, unless `--changed-conditions` is given. `genotype`: its source.
     pub fn check(
         &self,
         genotype: &str,
@@ -63,9 +65,8 @@ impl Origin {
         let seed = seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
         let digest: String = self.config_digest.chars().take(SHOWN).collect();
         Err(Error::Input(format!(
-            "{genotype}: it was evolved in `{}`{seed}, configuration {digest}, and {} is another \
-             experiment; give the file of that one, or --changed-conditions to take this one \
-             knowingly",
+            "{genotype}: it evolved in `{}`{seed}, configuration {digest}, and {} is another \
+             experiment; give the original file, or --changed-conditions to accept this one",
             self.name.escape_debug(),
             file.path().display()
         )))

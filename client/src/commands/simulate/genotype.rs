@@ -20,17 +20,17 @@ use crate::{
     settings::Settings,
 };
 
-/// Genes, and where they come from, which is what this displays as.
+/// Genes and their source, which is also their display.
 #[derive(Debug)]
 pub struct Genotype {
     pub genes: Vec<f64>,
-    /// Where the genes come from, for people: "champion of experiment 3".
+    /// The source of the genes, for people: "champion of experiment 3".
     source: String,
 }
 
 impl Genotype {
-    /// The genotype in a file, to be simulated in an experiment file. A champion of another
-    /// experiment is refused, unless that is wanted.
+    /// The genotype in a file, for use with an experiment file. Refuses a champion of
+    /// another experiment, unless `--changed-conditions` is given.
     pub fn read(path: &Path, file: &ExperimentFile, changed: ChangedArg) -> Result<Self, Error> {
         let (genes, origin) = read(path).map_err(|problem| {
             Error::Input(format!("no genotype in {}: {problem}", path.display()))
@@ -46,7 +46,7 @@ impl Genotype {
         Self { genes: found.individual.genotype, source: described(address) }
     }
 
-    /// The genotype that goes with an experiment file, not yet checked against it.
+    /// The genotype for an experiment file, not yet checked against it.
     pub async fn choose(
         settings: Settings,
         args: &SimulateArgs,
@@ -76,7 +76,7 @@ impl fmt::Display for Genotype {
     }
 }
 
-/// Reads a list of genes, or the one in an object, and what that says of its experiment.
+/// Reads a list of genes, or the list in an object together with its experiment.
 fn read(path: &Path) -> Result<(Vec<f64>, Option<Origin>), String> {
     file_kind::expect(path, &[Kind::Champion, Kind::Genes], "a file with a genotype")?;
     let text = read_text(path, GENOTYPE_BYTES).map_err(|error| error.to_string())?;
@@ -94,7 +94,7 @@ fn read(path: &Path) -> Result<(Vec<f64>, Option<Origin>), String> {
     Ok((genes, origin))
 }
 
-/// Uniform genes, from the streams that draw the first generation of a population.
+/// Uniform genes from the streams of the first generation of a population.
 fn random(compiled: &Compiled) -> Vec<f64> {
     let segments = compiled.experiment.population_segments().iter().zip(0..);
     let genes = segments.flat_map(|(segment, population)| {

@@ -1,4 +1,4 @@
-//! Simulating shipped experiments with genotypes from everywhere.
+//! Simulating shipped experiments with genotypes from all sources.
 
 use std::{fs, path::PathBuf};
 
@@ -70,7 +70,7 @@ async fn a_champion_is_the_same_from_a_file_and_from_a_coordinator() {
     assert_eq!(fetched["trials"], read["trials"]);
     assert_eq!(fetched["genotype"], "champion of experiment 3");
 
-    // One that was evolved in another file is taken only knowingly.
+    // A genotype of another file is accepted on request only.
     fake.script(|script| script.experiment.config_digest = "ab".repeat(32));
     let error = run(connection.address(), &from_coordinator).await.unwrap_err();
     assert_eq!(error.exit_code(), 2);

@@ -15,14 +15,15 @@ use crate::{
     output_file::{OutputFile, Overwrite, unwritable},
 };
 
-/// Columns of a trace that have to be asked for.
+/// Columns of a trace that are written on request only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ExtraColumns {
     /// neuron_ENSEMBLE_0, ...: activity of every neuron after the step.
     Neurons,
-    /// frame_emitter, frame_message_0, ...: who was heard, and what it said.
+    /// frame_emitter, frame_message_0, ...: the robot that was heard, and its message.
     Frames,
-    /// led_target: 1 if the task wants the LED on, 0 if off; empty where it does not say.
+    /// led_target: 1 if the task wants the LED on, 0 if off; empty if the task has no
+    /// target.
     Targets,
 }
 
@@ -35,7 +36,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Begins the file, which is there when it is finished.
+    /// Begins the file, which appears when it is finished.
     pub fn create(
         path: &Path,
         config: &ExperimentConfig,
@@ -72,7 +73,7 @@ struct Rows<W> {
     objects: Vec<Object>,
     /// Names of all inputs of all controllers.
     stimuli: IndexSet<String>,
-    /// Names of all neurons, in the order of their activities; empty if nobody asked.
+    /// Names of all neurons, in the order of their activities; empty unless requested.
     neurons: Vec<String>,
     /// Whether neurons have voltages, too.
     has_voltages: bool,
@@ -81,7 +82,7 @@ struct Rows<W> {
     n_rows: u64,
 }
 
-/// An object of the experiment file, and what its robots have in common.
+/// An object of the experiment file, and the common properties of its robots.
 struct Object {
     name: String,
     /// Per input of the controller, its index in `Rows::stimuli`.
@@ -101,7 +102,7 @@ impl<W: io::Write> Rows<W> {
                     let sensor = robot.sensors.light_sensor.iter();
                     sensor.map(|sensor| ("light_sensor", sensor.n_sectors)).collect()
                 }
-                // What it asks for is its own business.
+                // A trace does not contain the values that scripts read.
                 RobotController::ScriptController => Vec::new(),
             };
             let inputs = inputs.iter().flat_map(|(name, n)| (0..*n).map(move |i| (name, i)));
@@ -154,7 +155,7 @@ impl<W: io::Write> Rows<W> {
         Ok(())
     }
 
-    /// The cells that were asked for.
+    /// The requested cells.
     fn extra_cells(&self, robot: &RobotRecord) -> Vec<String> {
         // Robots without a network have no activity.
         let activity = |i| robot.activity.get(i).copied().map(number).unwrap_or_default();
@@ -175,8 +176,8 @@ impl<W: io::Write> Rows<W> {
         cells
     }
 
-    /// Messages, lights and measures are the same in all steps of an experiment,
-    /// values aside.
+    /// The columns of messages, lights and measures are the same in all steps of an
+    /// experiment.
     fn heading(&self, record: &StepRecord) -> Vec<String> {
         let place = ["trial", "step", "robot", "object", "x_cm", "y_cm", "heading_rad"];
         let actions = ["wheel_right", "wheel_left", "led", "mode"];
@@ -231,7 +232,7 @@ fn number(value: f64) -> String {
     format!("{value:?}")
 }
 
-/// A name, which may contain what separates cells but no control characters.
+/// A name, which may contain separators of cells but no control characters.
 fn quoted(name: &str) -> String {
     if name.contains([',', '"']) {
         format!("\"{}\"", name.replace('"', "\"\""))

@@ -1,8 +1,8 @@
-//! Prints what has happened to an experiment, to those of a group, or to all, in the order of time.
+//! Prints the events of an experiment, of a group, or of all experiments, in the order of time.
 //!
 //! The merged log does not watch every experiment: one stream per experiment would not scale,
-//! and events can be put in the order of time only when all events of a moment are known. It
-//! reads again when the coordinator says that there is news.
+//! and ordering the events of a moment requires all of them. It reads again when the
+//! coordinator announces news.
 
 mod merge;
 
@@ -24,14 +24,14 @@ use crate::{
 
 use self::merge::Merge;
 
-/// Which events are printed.
+/// The events to print.
 #[derive(Debug)]
 pub struct Wanted {
-    /// Of which experiments; none: of all, in the order of time.
+    /// Their experiments; none: all experiments, in the order of time.
     pub subject: Option<Subject>,
-    /// Whether new ones are waited for, until the experiments have ended.
+    /// Whether to wait for new events until the experiments have ended.
     pub follow: bool,
-    /// The sequence number of the first.
+    /// The sequence number of the first event.
     pub from_sequence: u64,
 }
 
@@ -42,15 +42,15 @@ pub async fn print(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let patience = if wanted.follow { PATIENCE } else { connection.patience() };
-    // The first request has the usual patience: an unreachable coordinator is an
-    // error soon.
+    // The first request has the usual patience, so an unreachable coordinator soon is an
+    // error.
     let mut experiments = chosen(connection, wanted.subject.as_ref()).await?;
     let connection = connection.with_patience(patience);
     // Per experiment, the sequence number of the next event to print.
     let mut positions: BTreeMap<u64, u64> = BTreeMap::new();
     let mut news = News { connection: &connection, stream: None };
     if wanted.follow {
-        // Before the first reading, so that nothing falls between.
+        // Subscribes before the first reading, so that no event is missed.
         news.next().await?;
         experiments = chosen(&connection, wanted.subject.as_ref()).await?;
     }
@@ -78,8 +78,7 @@ pub async fn print(
     }
 }
 
-/// Nothing more will happen in a data directory: an error if an experiment that is followed has
-/// not ended.
+/// A data directory has no new events: fails if a followed experiment has not ended.
 fn deserted(
     experiments: &[Experiment],
     is_of_some: bool,
@@ -96,14 +95,14 @@ fn deserted(
     }
 }
 
-/// What says that there may be new events.
+/// The source of announcements of new events.
 struct News<'a> {
     connection: &'a Connection,
     stream: Option<Streaming<WatchNewsResponse>>,
 }
 
 impl News<'_> {
-    /// Waits for news, again and again while the coordinator cannot be reached, up to the
+    /// Waits for news, and retries while the coordinator is unreachable, up to the
     /// connection's patience.
     async fn next(&mut self) -> Result<(), Error> {
         let mut give_up_at = None;

@@ -17,24 +17,24 @@ use crate::{
     finding::Finding,
 };
 
-/// A stream that lasted so long counts as contact with the coordinator, even if it
-/// brought no event.
+/// A stream of at least this duration counts as contact with the coordinator, even
+/// without an event.
 const LASTING: Duration = Duration::from_secs(5);
 
-/// What is to be shown of an experiment.
+/// News of an experiment, to be shown.
 #[derive(Debug)]
 pub enum News {
     /// A generation of the experiment of that number.
     Generation(u64, GenerationSummary),
     /// A line about the experiment of that number.
     Notice(u64, String),
-    /// What keeps the experiment of that number from being computed; none: nothing any more.
+    /// The obstacle of the experiment of that number; none: it has passed.
     Situation(u64, Option<Finding>),
     /// The coordinator cannot be reached.
     Lost(String),
     /// The experiment of that number has ended; the best fitness of its first generation.
     Ended(u64, Option<f64>),
-    /// It can be followed no further.
+    /// The experiment cannot be followed further.
     Failed(Error),
 }
 
@@ -42,7 +42,7 @@ pub enum News {
 pub struct Follower {
     pub connection: Connection,
     pub experiment_id: u64,
-    /// Shows what happens.
+    /// Receives the news.
     pub news: mpsc::Sender<News>,
 }
 
@@ -50,13 +50,13 @@ pub struct Follower {
 enum StreamEnd {
     /// The experiment has ended.
     Final,
-    /// For this reason, which may be transient.
+    /// The stream failed for this reason, which may be transient.
     Broken(String),
 }
 
 impl Follower {
-    /// Follows from an event on. Returns the best fitness of the first generation, if that
-    /// was among the events, once the experiment has ended.
+    /// Follows the experiment to its end, from an event on. Returns the best fitness of
+    /// the first generation, if that was among the events.
     pub async fn run(&self, next_sequence: u64) -> Result<Option<f64>, Error> {
         let mut seen = Seen { next_sequence, first_best: None, is_over: false };
         let mut backoff = backoff();
@@ -69,7 +69,7 @@ impl Follower {
                     match self.read(events, &mut seen).await? {
                         StreamEnd::Final => return Ok(seen.first_best),
                         StreamEnd::Broken(reason) => {
-                            // A stream that opens and breaks at once is no contact.
+                            // A stream that breaks at once is no contact.
                             if seen.next_sequence > sequence || opened.elapsed() > LASTING {
                                 backoff.reset();
                                 unreachable_since = None;
@@ -120,7 +120,7 @@ impl Follower {
     }
 
     async fn tell(&self, news: News) {
-        // Whoever is not interested any more ends this task.
+        // If the receiver is gone, it also ends this task.
         let _ = self.news.send(news).await;
     }
 
@@ -144,16 +144,16 @@ impl Follower {
                 let text = escape(&notice.message).into_owned();
                 self.tell(News::Notice(self.experiment_id, text)).await;
             }
-            // A kind of event that only newer versions know.
+            // A kind of event of newer versions.
             None => {}
         }
     }
 }
 
-/// What has been read from the streams so far.
+/// The progress of reading the streams.
 struct Seen {
     next_sequence: u64,
     first_best: Option<f64>,
-    /// Whether the experiment has ended, as far as is known.
+    /// Whether an event has said that the experiment ended.
     is_over: bool,
 }

@@ -10,7 +10,7 @@ use crate::{
     connection::Connection, error::Error, json, progress::Progress, subject::Subject, text,
 };
 
-/// Which end counts as success.
+/// The end that counts as success.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum WaitFor {
     /// All generations done, or the target fitness reached.
@@ -19,7 +19,7 @@ pub enum WaitFor {
     Ended,
 }
 
-/// Waits until an experiment ends, or all of a group. `limit`: how long at most.
+/// Waits until an experiment or all of a group have ended. `limit`: the maximum time.
 pub async fn wait(
     connection: &Connection,
     subject: &Subject,
@@ -29,7 +29,7 @@ pub async fn wait(
 ) -> Result<(), Error> {
     let deadline = limit.map(|limit| Instant::now() + limit);
     let mut outcome = Ok(());
-    // One after the other: the last to end is waited for in any order.
+    // One after the other: the order does not change the time until all have ended.
     for experiment in connection.subject(subject).await? {
         let id = experiment.id;
         let of = [experiment.clone()];

@@ -1,4 +1,4 @@
-//! What keeps experiments from being computed, while they are followed.
+//! Obstacles of experiments, while they are followed.
 
 use std::time::Duration;
 
@@ -17,12 +17,11 @@ use crate::{
     finding::{Finding, stall},
 };
 
-/// A situation that passes within this time is not worth a line.
+/// An obstacle that passes within this time is not reported.
 const GRACE: Duration = Duration::from_secs(1);
 
-/// Tells what keeps experiments from being computed, of one after the other: what holds for
-/// the fleet holds for all of them. Ends when all have ended, or if the coordinator cannot say
-/// such things.
+/// Reports obstacles of one experiment after the other, because obstacles of the fleet concern
+/// all of them. Ends when all experiments have ended, or if the coordinator cannot explain.
 pub async fn tell(connection: Connection, ids: Vec<u64>, news: mpsc::Sender<News>) {
     for id in ids {
         let mut told = None;
@@ -37,7 +36,7 @@ pub async fn tell(connection: Connection, ids: Vec<u64>, news: mpsc::Sender<News
                         break;
                     }
                 }
-                // Whoever reads the events says that the connection is lost.
+                // The follower of the events reports a lost connection.
                 Err(status) if is_transient(&status) => {}
                 Err(_) => return,
             }
@@ -46,17 +45,17 @@ pub async fn tell(connection: Connection, ids: Vec<u64>, news: mpsc::Sender<News
     }
 }
 
-/// Reads explanations of one experiment.
+/// Reads the explanations of one experiment.
 struct Reader<'a> {
     connection: &'a Connection,
     id: u64,
     news: &'a mpsc::Sender<News>,
-    /// What was told last; none: that nothing keeps it.
+    /// The last reported obstacle; none: no obstacle.
     told: &'a mut Option<Finding>,
 }
 
 impl Reader<'_> {
-    /// Tells what changes and lasts. Returns whether the experiment has ended.
+    /// Reports obstacles that change and last. Returns whether the experiment has ended.
     async fn read(&mut self, mut explanations: Streaming<WatchExplanationResponse>) -> bool {
         let mut found = self.told.clone();
         loop {
@@ -73,10 +72,10 @@ impl Reader<'_> {
                     found = stall(&explanation, self.connection.address());
                 }
                 Ok(_) => return false,
-                // It has lasted.
+                // The obstacle has lasted.
                 Err(_) => {
                     self.told.clone_from(&found);
-                    // Whoever is not interested any more ends this task.
+                    // If the receiver is gone, it also ends this task.
                     let _ = self.news.send(News::Situation(self.id, found.clone())).await;
                 }
             }

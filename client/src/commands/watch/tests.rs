@@ -42,7 +42,7 @@ async fn events_are_shown_once_and_in_order_however_often_the_stream_breaks() {
         watches: [
             (vec![state(1, ExperimentState::Running), generation(2, 0)], None),
             (vec![], Some(Status::unavailable("shutting down"))),
-            // One more than asked for.
+            // One more than requested.
             (vec![generation(2, 0), generation(3, 1)], None),
             (vec![generation(4, 2), state(5, completed)], None),
         ]
@@ -138,7 +138,7 @@ async fn a_group_ends_with_its_comparison_and_the_next_commands() {
     for command in ["compare pair --to comparison.svg", "plot pair --to fitness.svg", "list pair"] {
         let line = format!("\n  swarmctl {command} --data-dir {}", data.display());
         assert!(after[next..].contains(&line), "{after}");
-        // It is what it says: a command that works.
+        // The suggested command works.
         let to = directory.path().join("figure.svg");
         let words = command.replace("comparison.svg", to.to_str().unwrap());
         let words = words.replace("fitness.svg", to.to_str().unwrap());

@@ -1,5 +1,5 @@
-//! Frames as an animated PNG that is small: of each frame only the pixels that have changed, in at
-//! most 255 colours.
+//! Frames as a small animated PNG: it stores only the changed pixels of each frame, in at most 255
+//! colours.
 
 use std::{collections::BTreeMap, io::Write};
 
@@ -8,19 +8,19 @@ use png::{BlendOp, EncodingError, Writer};
 /// Red, green and blue.
 type Rgb = [u8; 3];
 
-/// The colour that leaves a pixel as it is.
+/// The colour that leaves a pixel unchanged.
 const KEPT: u8 = 0;
 
 /// The colours of an animation.
 pub struct Palette {
-    /// Without the first one, [`KEPT`].
+    /// All colours but the first one, [`KEPT`].
     colors: Vec<Rgb>,
-    /// Where each colour is that was looked for.
+    /// A cache of the places of colours.
     places: BTreeMap<Rgb, u8>,
 }
 
 impl Palette {
-    /// Those that are most frequent in some frames.
+    /// The palette of the most frequent colours in some frames.
     pub fn from_frames<'a>(frames: impl Iterator<Item = &'a [u8]>) -> Self {
         let mut counts: BTreeMap<Rgb, usize> = BTreeMap::new();
         for frame in frames {
@@ -35,18 +35,18 @@ impl Palette {
         Self { colors, places: BTreeMap::new() }
     }
 
-    /// As a PNG has it.
+    /// The palette in the format of PNG.
     pub fn bytes(&self) -> Vec<u8> {
         let kept = [[0; 3]];
         kept.iter().chain(&self.colors).flatten().copied().collect()
     }
 
-    /// How opaque its colours are: all but the first are.
+    /// The opacity of its colours: all but the first are opaque.
     pub fn opacity() -> Vec<u8> {
         vec![0]
     }
 
-    /// The place of the colour that is nearest.
+    /// The place of the nearest colour.
     fn place(&mut self, color: Rgb) -> u8 {
         *self.places.entry(color).or_insert_with(|| {
             let distance = |other: &Rgb| -> u32 {
@@ -63,7 +63,7 @@ impl Palette {
 pub struct Frames {
     side: usize,
     palette: Palette,
-    /// What is seen now, as places in the palette; empty before the first frame.
+    /// The shown picture, as places in the palette; empty before the first frame.
     shown: Vec<u8>,
 }
 
@@ -72,7 +72,7 @@ impl Frames {
         Self { side: side as usize, palette, shown: Vec::new() }
     }
 
-    /// Writes what changes with a frame.
+    /// Writes the changes of a frame.
     pub fn write<W: Write>(
         &mut self,
         writer: &mut Writer<W>,
@@ -92,7 +92,7 @@ impl Frames {
             part.extend(both.map(|(next, shown)| if next == shown { KEPT } else { *next }));
         }
         self.shown = next;
-        // Its size is checked where the frame before was.
+        // The encoder checks a new size at the previous position, so start in the corner.
         writer.set_frame_position(0, 0)?;
         writer.set_frame_dimension((right - left) as u32, (bottom - top) as u32)?;
         writer.set_frame_position(left as u32, top as u32)?;
@@ -100,7 +100,7 @@ impl Frames {
         writer.write_image_data(&part)
     }
 
-    /// The rectangle of what changes: left, top, and the first column and row beyond it. A frame
+    /// The rectangle of the changes: left, top, and the first column and row beyond it. A frame
     /// has at least one pixel.
     fn changed(&self, next: &[u8]) -> [usize; 4] {
         let differing = (0..next.len()).filter(|&i| next[i] != self.shown[i]);

@@ -1,13 +1,13 @@
-//! Which part of the world a picture shows.
+//! The part of the world that a picture shows.
 
 use experiment_file::ExperimentConfig;
 use sim_core::{StepRecord, Vec2};
 
-/// Around everything that is shown, cm.
+/// Margin around all shown objects, cm.
 const MARGIN: f64 = 40.0;
 
-/// The square of the plane that is seen. The plane is a torus: everything is drawn at the
-/// image that is nearest to the middle.
+/// The visible square of the plane. The plane is a torus: each object is drawn at its
+/// image nearest to the middle.
 pub struct Camera {
     pub middle: Vec2,
     period: Vec2,

@@ -1,5 +1,5 @@
-//! A step as a drawing, on pixels or as SVG. Lengths are points, of which a canvas has [`POINTS`]
-//! along each side, and several pixels each: so it is as smooth as the pixels are fine.
+//! A step as a drawing, on pixels or as SVG. Lengths are in points: a canvas has [`POINTS`] along
+//! each side, each of several pixels, so finer pixels give a smoother drawing.
 
 use std::{f64::consts::PI, iter};
 
@@ -17,14 +17,14 @@ use crate::figure::{FONT, embed_font};
 
 /// Side of a canvas, points.
 const POINTS: f64 = 800.0;
-/// Radius of a robot, cm, and the least and the greatest that is drawn, points.
+/// Radius of a robot, cm, and the smallest and largest drawn radius, points.
 const RADIUS: f64 = 5.5;
 const RADII: (f64, f64) = (5.0, 20.0);
 /// Rings of a glow, from its reach inwards: share of the reach, and opacity.
 const GLOW: [(f64, f64); 5] = [(1.0, 0.03), (0.8, 0.035), (0.6, 0.04), (0.4, 0.05), (0.2, 0.08)];
 /// Length of an arrow's head, points, and half its angle.
 const HEAD: (f64, f64) = (9.0, 0.45);
-/// Lengths that a scale bar may have, cm; it is the longest of them that fits a quarter of the side.
+/// Lengths of a scale bar, cm; the longest that fits a quarter of the side is drawn.
 const BARS: [f64; 10] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0];
 
 const GROUND: RGBColor = RGBColor(251, 252, 254);
@@ -42,7 +42,7 @@ type Area<B> = DrawingArea<B, Shift>;
 type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 type Place = (i32, i32);
 
-/// What is the same in all steps: how far areas and lights reach, cm, and their colours.
+/// Constants of all steps: the reach of areas and lights, cm, and their colours.
 pub struct Discs {
     areas: Vec<(f64, RGBColor)>,
     lights: Vec<(f64, RGBColor)>,
@@ -70,7 +70,7 @@ impl Discs {
     }
 }
 
-/// The colour of a word; grey for those that only the task knows.
+/// The colour of a word; grey for colours that only the task knows.
 fn color_named(name: &str) -> RGBColor {
     match name {
         "black" => RGBColor(0, 0, 0),
@@ -83,7 +83,8 @@ fn color_named(name: &str) -> RGBColor {
     }
 }
 
-/// Draws the last of some steps, and the ways that lead to it. `side`: of the canvas, pixels.
+/// Draws the last of some steps, and the trails that lead to it. `side`: of the canvas,
+/// pixels.
 pub fn draw<B: DrawingBackend>(
     area: &Area<B>,
     side: u32,
@@ -109,7 +110,7 @@ pub fn draw<B: DrawingBackend>(
     area.present()
 }
 
-/// Draws on a canvas what a camera sees.
+/// Draws the view of a camera on a canvas.
 struct Pen<'a, B: DrawingBackend> {
     area: &'a Area<B>,
     camera: &'a Camera,
@@ -155,7 +156,7 @@ impl<B: DrawingBackend> Pen<'_, B> {
                 self.disc(self.camera.place(*center), pixels(share * reach), color.mix(opacity))?;
             }
         }
-        // Over the glow, they keep their colours.
+        // Drawn over the glow, areas keep their colours.
         for ((reach, color), center) in discs.areas.iter().zip(&now.areas) {
             self.disc(self.camera.place(*center), pixels(*reach), color.mix(0.3))?;
         }
@@ -184,7 +185,7 @@ impl<B: DrawingBackend> Pen<'_, B> {
         Ok(())
     }
 
-    /// The ways of all robots, in pieces between which they went over the edge.
+    /// The trails of all robots, cut where a robot crossed the edge.
     fn trails(&self, way: &[StepRecord]) -> Drawn<B> {
         let n_robots = way.last().map_or(0, |now| now.robots.len());
         let style = self.stroke(WAY, 1.5);
@@ -200,7 +201,7 @@ impl<B: DrawingBackend> Pen<'_, B> {
         Ok(())
     }
 
-    /// Arrows from those who were heard to those who heard them.
+    /// Arrows from emitters to receivers.
     fn hearing(&self, now: &StepRecord) -> Drawn<B> {
         let style = self.stroke(FRAME.mix(0.55), 1.6);
         for robot in &now.robots {

@@ -18,7 +18,7 @@ fn config(objects: &str) -> ExperimentConfig {
     ExperimentConfig::from_json(&text, "", evolution::ALGORITHMS).unwrap().0
 }
 
-/// Heading and rows of the first trial, and what they were made from.
+/// Heading and rows of the first trial, and the records behind them.
 fn trace(config: &ExperimentConfig) -> (Vec<Vec<String>>, Vec<StepRecord>) {
     let experiment = Simulation::compile(config).unwrap();
     let genotype = vec![0.6; experiment.genotype_len()];

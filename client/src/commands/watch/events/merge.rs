@@ -10,13 +10,13 @@ use swarm_proto::v1::{Event, Experiment};
 
 use crate::{connection::Connection, error::Error};
 
-/// The events to print, up to the last one of each experiment that was known at the
+/// The events to print, up to the last event of each experiment that was known at the
 /// start.
 pub struct Merge<'a> {
     connection: &'a Connection,
     sources: Vec<Source<'a>>,
-    /// Time of the next event of each source that has one, and its index: of
-    /// events of the same millisecond, the older experiment's come first.
+    /// Time of the next event of each source that has one, and its index. Within a
+    /// millisecond, events of the older experiment come first.
     heads: BinaryHeap<Reverse<(u64, usize)>>,
     is_begun: bool,
 }
@@ -26,13 +26,13 @@ struct Source<'a> {
     page: VecDeque<Event>,
     /// Sequence number of the first event that is not in `page` yet.
     next_sequence: u64,
-    /// The time of the event before: the coordinator's clock may have been set
-    /// back, but an experiment's events keep their order.
+    /// The time of the previous event: the coordinator's clock may have been set back,
+    /// but an experiment's events keep their order.
     latest_ms: u64,
 }
 
 impl<'a> Merge<'a> {
-    /// Merges events of experiments, each from a sequence number on.
+    /// Merges events of experiments, each from its sequence number on.
     pub fn new(connection: &'a Connection, from: Vec<(&'a Experiment, u64)>) -> Self {
         let source = |(experiment, next_sequence)| Source {
             experiment,
@@ -44,7 +44,7 @@ impl<'a> Merge<'a> {
         Self { connection, sources, heads: BinaryHeap::new(), is_begun: false }
     }
 
-    /// The next event; none once all have been returned.
+    /// The next event; none at the end.
     pub async fn next(&mut self) -> Result<Option<(&'a Experiment, Event)>, Error> {
         if !self.is_begun {
             self.is_begun = true;
