@@ -29,7 +29,7 @@ from swarm.v1.experiment_pb2_grpc import ExperimentServiceStub
 
 Response = TypeVar("Response")
 
-# Errors after which the same request may succeed. Every request can be repeated safely.
+# Transient errors. Every request can be repeated safely.
 TRANSIENT = (
     StatusCode.UNAVAILABLE, StatusCode.DEADLINE_EXCEEDED,
     StatusCode.RESOURCE_EXHAUSTED, StatusCode.ABORTED,
@@ -51,7 +51,7 @@ PAUSE_S = 1  # between attempts
 
 
 class Coordinator:
-    """A coordinator that may go away for a while and come back."""
+    """A coordinator that may be unreachable for a while."""
 
     def __init__(self, args: argparse.Namespace) -> None:
         url = urlsplit(args.coordinator)
@@ -77,7 +77,7 @@ class Coordinator:
         self.patience_s: float = args.patience
 
     def call(self, method: Callable[..., Response], request: object) -> Response:
-        """One answer to one request, which is repeated while the coordinator is away."""
+        """The answer to one request, repeated while the coordinator is unreachable."""
         give_up_at = time.monotonic() + self.patience_s
         while True:
             try:
@@ -89,7 +89,7 @@ class Coordinator:
                 time.sleep(PAUSE_S)
 
     def follow(self, experiment: pb.Experiment) -> None:
-        """Prints every generation once, also across breaks of the stream."""
+        """Prints every generation once, even if the stream breaks."""
         get = pb.GetExperimentRequest(experiment_id=experiment.id)
         watch = pb.WatchExperimentRequest(experiment_id=experiment.id, from_sequence=1)
         is_over = False
@@ -174,7 +174,7 @@ def main() -> int:
             remark(f"{about}: {line}")
         return EXIT_CODES.get(error.code(), 1)
     except KeyboardInterrupt:
-        remark("interrupted; the experiment goes on")
+        remark("interrupted; the experiment continues")
         return 130
 
 

@@ -33,7 +33,7 @@ mod _core {
         workers::Worker,
     };
 
-    /// Names the function that the simulator computes: equal names, equal bits.
+    /// The name of the function that the simulator computes: equal names mean equal bits.
     #[pymodule_export]
     const FINGERPRINT: &str = sim_core::FINGERPRINT;
 

@@ -2,8 +2,8 @@
 
     python web/tests/browser.py target/debug
 
-The argument is the folder with coordinator, worker and swarmctl; `harness.py` says what else there
-is. Without Chromium and its driver the tests are skipped, with a line that says so.
+The argument is the folder with coordinator, worker and swarmctl; `harness.py` describes its other
+options. Without Chromium and its driver the tests are skipped, with a line that says so.
 """
 
 import csv
@@ -88,7 +88,7 @@ class Pages(BrowserTest):
         self.script("document.querySelector('.heat-map').scrollIntoView()")
 
         def fitness_down_the_first_column():
-            """What is read out cell by cell."""
+            """The readouts of cells, one by one."""
             found = []
             n_individuals = 32
             for place in range(n_individuals):
@@ -236,7 +236,7 @@ class Live(BrowserTest):
         left, right = workers
         left.terminate()
         left.wait()
-        # Alone and stopped, it holds what nobody else computes.
+        # Alone and stopped, it holds items that no other worker computes.
         right.send_signal(signal.SIGSTOP)
         held = """return fetch('/api/timeline').then((it) => it.json()).then(({ workers, assignments }) =>
             assignments.filter((it) => it[8] === 'unanswered' && workers[it[0]][1] === 'right').map((it) => it.slice(2, 5)))"""
@@ -255,7 +255,7 @@ class Live(BrowserTest):
         self.picture("narrow-timeline")
 
     def test_pages_are_encrypted_where_the_coordinator_is(self):
-        """The certificate is made up, so the browser is told to take it."""
+        """The certificate is self-made, so the browser is told to accept it."""
         self.browser.execute_cdp_cmd("Security.setIgnoreCertificateErrors", {"ignore": True})
         self.expected_complaints = ["401 (Unauthorized)"]
         with tempfile.TemporaryDirectory() as directory:
@@ -299,7 +299,7 @@ class Live(BrowserTest):
 
         def answer(button, text=None):
             self.find(f"#do-{button}")
-            # Buttons are made anew as the run goes on.
+            # The page replaces buttons as the run advances.
             self.wait(lambda: self.script(f"const it = document.querySelector('#do-{button}'); if (it) setTimeout(() => it.click()); return !!it"), button)
             alert = WebDriverWait(self.browser, DEADLINE, 0.05).until(expected_conditions.alert_is_present())
             if text is None:
@@ -372,7 +372,7 @@ class Live(BrowserTest):
 
 
 class File(BrowserTest):
-    """A replay that stands alone."""
+    """A replay in a file of its own."""
 
     is_dark = True
 

@@ -1,4 +1,5 @@
-"""Curves and maps in a real browser: with keys, linked, saved, and told apart; called as `browser.py` is."""
+"""Curves and maps in a real browser: keys, linked zoom, export, and distinct colours; called like
+`browser.py`."""
 
 import csv
 import io
@@ -127,7 +128,7 @@ class Figures(BrowserTest):
         self.assertIn(f"elite: {2 * (n_generations - 1)}, ", self.text(".families .keys"))
         self.script("document.querySelector('.families').scrollIntoView()")
         self.picture("families")
-        # As the client tells of the same births.
+        # The same births as in the client's answer.
         told = json.loads(self.fleet.swarmctl("lineage", f"{run}@5/9", "--depth", "1"))["populations"][0]["ancestors"]
         rows = list(csv.DictReader(io.StringIO(self.saved(".families .save:last-child"))))
         self.assertEqual(len(rows), n_children)
@@ -159,7 +160,7 @@ class Figures(BrowserTest):
         self.find(".families[data-children='64']")
         self.press(".families .cells", Keys.END)
         said = self.text(".families .readout")
-        # The highest point in its row of pixels, to which the pointer goes.
+        # The pointer moves to the highest point of its row of pixels.
         canvas = self.find(".families canvas")
         self.script("document.querySelector('.families').scrollIntoView()")
         at = self.script("""
@@ -278,7 +279,7 @@ class Figures(BrowserTest):
         self.assertEqual(self.script(f"return document.querySelectorAll('{picture} .cursor rect').length"), 1)
         self.picture("timeline-keys")
         n_bars = self.script(f"return document.querySelectorAll('{picture} > g:not(.cursor) rect').length")
-        # It stays as it is while somebody goes through it.
+        # The picture stays while the user goes through it.
         rows = list(csv.DictReader(io.StringIO(self.saved(".fleet-timeline .save:last-child"))))
         self.assertEqual(len(rows), n_bars)
         self.assertEqual({it["worker"] for it in rows}, {"left", "right"})
@@ -308,7 +309,7 @@ class Figures(BrowserTest):
 
 
 def contrast(a, b):
-    """As WCAG 2 has it."""
+    """The contrast ratio of WCAG 2."""
 
     def luminance(color):
         parts = [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]

@@ -1,4 +1,4 @@
-"""How many frames of a replay are drawn per second, in headless Chromium, and where the time goes.
+"""Measures frames per second of a replay in headless Chromium, and the use of the time.
 
     target/python/bin/python web/tests/frames.py target/debug [--profile]
 
@@ -26,7 +26,7 @@ N_ROBOTS = [50, 500]
 SECONDS = 6
 STEPS = 200
 
-# The time of every frame, and what scripts took of it, ms.
+# The time of every frame, and the share of scripts in it, ms.
 COUNTER = """
     const ask = requestAnimationFrame.bind(window);
     window.frames_drawn = [];
@@ -59,7 +59,7 @@ class Frames(BrowserTest):
         self.browser.get(f"{html.as_uri()}#step=0")
         if has_reach:
             self.find("#show-reach").click()
-        # So slow that it does not end before it was measured.
+        # Slow enough that the replay lasts longer than the measurement.
         self.assertLess(SECONDS * 20, STEPS)
         self.browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
         before = self.main_thread()
@@ -82,12 +82,12 @@ class Frames(BrowserTest):
         )
 
     def main_thread(self):
-        """Seconds of a processor that it has used."""
+        """Processor seconds that the browser has used."""
         metrics = self.browser.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
         return next(it["value"] for it in metrics if it["name"] == "TaskDuration")
 
     def print_profile(self, profile):
-        """Functions by the time that they took themselves."""
+        """Functions by their own time."""
         names = {}
         for node in profile["nodes"]:
             frame = node["callFrame"]

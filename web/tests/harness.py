@@ -1,4 +1,4 @@
-"""What tests of pages, and measurements of them, share: programs, a fleet, a browser.
+"""The common parts of tests and measurements of pages: programs, a fleet, a browser.
 
 The first argument is the folder with coordinator, worker and swarmctl. Without Chromium and its
 driver the script ends at once, with a line that says so. With SWARM_SCREENSHOTS=DIR, pages
@@ -34,7 +34,7 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
-# Only what hangs takes so long.
+# A time limit that only a hanging page exceeds.
 DEADLINE = 120
 # A phone's, pixels.
 NARROW = 390
@@ -64,7 +64,7 @@ class Fleet:
         # The line before tells that it listens for clients.
         for line in self.coordinator.stderr:
             if "pages are served" in line:
-                # Who writes into a pipe that is full waits for its reader.
+                # A program that writes into a full pipe waits for its reader.
                 threading.Thread(target=self.coordinator.stderr.read, daemon=True).start()
                 return
         raise AssertionError("the coordinator does not start")
@@ -100,10 +100,10 @@ class Fleet:
 
 
 class BrowserTest(unittest.TestCase):
-    """A browser of its own for each test, whose console and requests are looked at."""
+    """A separate browser for each test, whose console and requests are checked."""
 
     is_dark = False
-    # What a test provokes on purpose, such as a refused login.
+    # Errors that a test provokes on purpose, such as a refused login.
     expected_complaints = ()
 
     def setUp(self):
@@ -140,7 +140,8 @@ class BrowserTest(unittest.TestCase):
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
     def width(self):
-        """That of all that a page has; a phone shrinks what is too wide, and so its window grows."""
+        """The width of the whole page; a phone shrinks a page that is too wide, so its window
+        grows."""
         return self.script("return document.documentElement.scrollWidth")
 
     def wait(self, condition, what):
@@ -153,7 +154,7 @@ class BrowserTest(unittest.TestCase):
         )
 
     def text(self, selector):
-        """As it is seen, of an element that may be another one in a moment."""
+        """The visible text of an element that the page may replace at any moment."""
         self.find(selector)
         return self.script(f"const it = document.querySelector({selector!r}); return it?.innerText ?? it?.textContent ?? ''")
 
@@ -164,7 +165,7 @@ class BrowserTest(unittest.TestCase):
         return self.browser.execute_script(text)
 
     def saved(self, selector):
-        """What a button saves."""
+        """The file that a button saves."""
         return self.browser.execute_async_script("""
             const [selector, done] = arguments;
             const make = URL.createObjectURL;

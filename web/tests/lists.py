@@ -1,4 +1,4 @@
-"""The list of experiments of people with many runs; called as `browser.py` is."""
+"""The list of experiments of people with many runs; called like `browser.py`."""
 
 import csv
 import gzip
@@ -66,7 +66,7 @@ class Lists(BrowserTest):
             changed += [it["id"] for it in news["experiments"]]
             mark = news["mark"]
         self.assertGreater(min(changed), N_JUDGED + N_STILL)
-        # Those of another server mean nothing to this one.
+        # Versions of another server are meaningless to this one.
         self.assertTrue(json.loads(self.asked("/api/experiments?since=ab.3")[1])["whole"])
 
     def test_clicks_are_answered_at_once_and_focus_and_scrolling_stay(self):
@@ -99,7 +99,7 @@ class Lists(BrowserTest):
             self.assertNotEqual(box.is_selected(), was)
         self.assertLess(statistics.median(answers), ANSWER_MAX, f"tasks of {self.script('return tasks')} ms")
         self.assertEqual(self.script("return [held[0].isConnected, document.activeElement === held[0]]"), [True, True])
-        # Text above the list may take another pixel of height; nobody loses a row by that.
+        # Text above the list may take another pixel of height, which hides no row.
         self.assertLess(abs(self.script("return scrollY - held[1]")), self.script("return held[0].closest('tr').offsetHeight"))
         asked = self.script("return performance.getEntriesByType('resource').filter((it) => it.name.includes('/api/experiments')).length")
         self.assertEqual(asked, 0, "the whole list is asked for again")

@@ -1,4 +1,4 @@
-"""The player in a real browser, in every form in which it is shown; called as `browser.py` is."""
+"""The player in a real browser, in all its forms; called like `browser.py`."""
 
 import csv
 import io
@@ -30,7 +30,7 @@ class Replays(BrowserTest):
 
     def open(self, path):
         self.browser.get(self.fleet.pages + path)
-        # A page that hangs fails its test soon, and not by the deadline of the driver.
+        # A hanging page fails its test soon, before the deadline of the driver.
         self.browser.set_script_timeout(20)
 
     def texts(self, selector):
@@ -81,7 +81,7 @@ class Replays(BrowserTest):
         self.script("document.querySelector('.strip').focus()")
         webdriver.ActionChains(self.browser).send_keys(Keys.ARROW_RIGHT, Keys.ENTER).perform()
         self.wait_for_text(".episode", f"trial {second} of its judgement")
-        # What is simulated is one of them, to the same bits.
+        # The simulation gives the bits of one of them.
         self.assertIn(f"this trial {fitness[second]:.4f}", self.text("#result"))
 
     def test_trials_and_steps_are_saved(self):
@@ -114,7 +114,7 @@ class Replays(BrowserTest):
         self.wait(lambda: self.script("return saved?.byteLength ?? 0"), "nothing is saved")
         self.assertLess(self.script("return saved.byteLength"), 1_000_000)
         self.assertGreater(self.script("return saved.byteLength"), 10_000)
-        # As Matroska files, which WebM ones are, begin.
+        # The first bytes of Matroska files, which include WebM files.
         self.assertEqual(self.script("return [...new Uint8Array(saved, 0, 4)]"), [0x1A, 0x45, 0xDF, 0xA3])
         self.assertEqual(self.text("#record"), "● video")
 
@@ -145,7 +145,8 @@ class Replays(BrowserTest):
             self.browser.get(html.as_uri() + "#step=0")
             self.wait_for_text(".legend .place", "light_red")
             self.find(".camera").click()
-            # Where the glow of several images would add up, it is not brighter than beside the lamp.
+            # Several images of a glow do not add up: no place is brighter than the one beside the
+            # lamp.
             shades = self.script("""
                 const it = document.querySelector('.world');
                 const { data } = it.getContext('2d').getImageData(0, 0, it.width, it.height);
@@ -285,7 +286,7 @@ class Replays(BrowserTest):
         self.find(".episode").click()
         webdriver.ActionChains(self.browser).send_keys(Keys.ARROW_RIGHT).perform()
         self.wait_for_text(".step", "step 7 of 99")
-        # What is typed into a field is for the field.
+        # Keys typed into a field belong to the field.
         self.find("#what-if-seed").send_keys("3", Keys.ARROW_LEFT, Keys.HOME)
         self.assertEqual(self.text(".step"), "step 7 of 99")
 

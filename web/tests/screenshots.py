@@ -1,8 +1,8 @@
-"""The pictures of docs/web.md and docs/gallery.md: pages and replays as they are now, in docs/figures.
+"""The pictures of docs/web.md and docs/gallery.md: present pages and replays, in docs/figures.
 
     target/python/bin/python web/tests/screenshots.py target/debug
 
-Called as `browser.py` is, and not a test: it writes the files anew.
+Called like `browser.py`. It is not a test: it replaces the files.
 """
 
 import json
@@ -15,7 +15,7 @@ from harness import CONFIG, PROGRAMS, BrowserTest, Fleet
 
 ROOT = CONFIG.parents[1]
 FIGURES = ROOT / "docs/figures"
-# A replay's figure: its published run, and the step and the robot that are seen.
+# A replay's figure: its published run, and the shown step and robot.
 REPLAYS = {
     "leader": ("leader_selection_snes", 60, 3),
     "border": ("borderline_snes", 120, 13),
@@ -24,7 +24,7 @@ REPLAYS = {
 }
 
 
-# Tasks of docs/gallery.md: the trial that is seen.
+# Tasks of docs/gallery.md: the shown trial.
 TASKS = {
     "foraging": 0, "division_of_labour": 0, "flocking": 0, "synchronisation": 0,
     "aggregation": 0, "dispersion": 0, "chain": 0, "predator": 1,
@@ -42,13 +42,13 @@ def replay(*args):
 
 class Screenshots(BrowserTest):
     def shoot(self, name, width, height, part="body"):
-        """`part`: what is at the top."""
+        """`part`: the element at the top."""
         self.prefer("light")
         self.browser.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         self.script(f"document.querySelector('{part}').scrollIntoView()")
-        # Two frames: one that is asked for now, and one that shows what it has drawn.
+        # Two frames: the first draws, the second shows the drawing.
         self.browser.execute_async_script("const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 300)))")
         self.browser.save_screenshot(str(FIGURES / f"{name}.png"))
 
@@ -104,7 +104,7 @@ class Screenshots(BrowserTest):
         self.shoot("pages-families", 1100, 640, ".families")
         fleet.swarmctl("submit", str(CONFIG), "--generations", "100000")
         self.browser.get(fleet.pages + "/fleet")
-        # Until the timeline has nothing else.
+        # Until the timeline shows only this.
         done = "return fetch('/api/experiments/11').then((it) => it.json()).then((it) => it.experiment.generations_done)"
         self.wait(lambda: self.script(done) > 70, "it does not go on")
         workers[3].kill()

@@ -1,9 +1,10 @@
-"""How fast pages are, in headless Chromium: first paint, zooming the map. Replays: `frames.py`.
+"""Measures the speed of pages in headless Chromium: first paint, zooming the map. Replays:
+`frames.py`.
 
     target/python/bin/python web/tests/speed.py target/release
 
-The argument is the folder with coordinator, worker and swarmctl. Without a
-graphics card, all is drawn by the processor.
+The argument is the folder with coordinator, worker and swarmctl. Without a graphics card, the
+processor draws everything.
 """
 
 import json
@@ -17,7 +18,7 @@ from harness import CONFIG, BrowserTest, Fleet
 GENERATIONS, POPULATION_SIZE = 160, 64
 FRAMES = 300
 
-# Milliseconds between frames while something happens in each.
+# Milliseconds between frames while each frame has work.
 INTERVALS = """
     const done = arguments[0];
     const times = [];

@@ -1,4 +1,4 @@
-"""Pages of what is not there, or does not go on, in a real browser; called as `browser.py` is."""
+"""Pages of missing or stopped experiments in a real browser; called like `browser.py`."""
 
 import json
 import pathlib
