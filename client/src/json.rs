@@ -40,7 +40,7 @@ pub struct LogLine<'a> {
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum LogKind<'a> {
-    Generation(GenerationFields<'a>),
+    Generation(#[serde(serialize_with = "GenerationFields::serialize")] &'a GenerationSummary),
     State { state: &'static str, reason: &'a str },
     Notice { message: &'a str },
 }
@@ -48,7 +48,7 @@ enum LogKind<'a> {
 impl<'a> LogLine<'a> {
     pub fn new(experiment: &'a Experiment, event: &'a Event) -> Self {
         let kind = event.kind.as_ref().map(|kind| match kind {
-            Kind::GenerationCompleted(summary) => LogKind::Generation(summary.into()),
+            Kind::GenerationCompleted(summary) => LogKind::Generation(summary),
             Kind::StateChanged(change) => {
                 LogKind::State { state: state_name(change.state()), reason: &change.reason }
             }
@@ -63,12 +63,14 @@ impl<'a> LogLine<'a> {
 #[derive(Debug, Serialize)]
 pub struct GenerationLine<'a> {
     experiment: u64,
-    #[serde(flatten)]
-    summary: GenerationFields<'a>,
+    #[serde(flatten, serialize_with = "GenerationFields::serialize")]
+    summary: &'a GenerationSummary,
 }
 
-#[derive(Debug, Serialize)]
-struct GenerationFields<'a> {
+/// The message, with its keys in this order.
+#[derive(Serialize)]
+#[serde(remote = "GenerationSummary")]
+struct GenerationFields {
     generation: u64,
     best: f64,
     mean: f64,
@@ -78,29 +80,12 @@ struct GenerationFields<'a> {
     duration_ms: u64,
     workers: u32,
     idle_share: f64,
-    digest: &'a str,
+    digest: String,
 }
 
 impl<'a> GenerationLine<'a> {
     pub fn new(experiment_id: u64, summary: &'a GenerationSummary) -> Self {
-        Self { experiment: experiment_id, summary: summary.into() }
-    }
-}
-
-impl<'a> From<&'a GenerationSummary> for GenerationFields<'a> {
-    fn from(summary: &'a GenerationSummary) -> Self {
-        Self {
-            generation: summary.generation,
-            best: summary.best,
-            mean: summary.mean,
-            min: summary.min,
-            standard_deviation: summary.standard_deviation,
-            episodes: summary.episodes,
-            duration_ms: summary.duration_ms,
-            workers: summary.workers,
-            idle_share: summary.idle_share,
-            digest: &summary.digest,
-        }
+        Self { experiment: experiment_id, summary }
     }
 }
 
