@@ -123,8 +123,8 @@ class Evolution:
         return champion
 
     def judge(self, evaluate: Evaluate, trials: int | None = None) -> Champion:
-        """Judges the champion on trials that selected nothing, as :func:`evolve` does at its end; first
-        compares the candidates, if that is outstanding. A judgement does not affect the further evolution.
+        """Judges the champion on trials that selected nothing, as :func:`evolve` does at its end. Compares
+        any new candidates first. A judgement does not affect the further evolution.
 
         ``evaluate``: as for :meth:`compare`. ``trials``: the experiment's ``judgement_trials`` if absent, 200
         without an experiment. ``judged`` of the champion is none if the fitness of a trial is not finite.

@@ -185,7 +185,10 @@ fn already_completed(existing: &Experiment, name: &str) -> String {
         None => "the same once more: --new".to_owned(),
     };
     format!(
-        "{}{of_group} has completed here with this file and seed, and is shown again\n           -> more generations: --generations {}\n           -> another run: --seed {}\n           -> {once_more}",
+        "{}{of_group} has already completed here with this file and seed\n           \
+         -> more generations: --generations {}\n           \
+         -> another run: --seed {}\n           \
+         -> {once_more}",
         text::title(existing),
         existing.generations.saturating_mul(2),
         existing.seed.wrapping_add(1)

@@ -33,9 +33,9 @@ class Proportion:
 def proportion(event: ArrayLike, where: ArrayLike | None = None) -> Proportion:
     """Share of true values of an array ``[T, ...]``, among the places where ``where`` is true.
 
-    Its error is that of a ratio over trials (Cochran, Sampling Techniques 1977, eq. 2.39), which
-    are independent. The thesis's Eq. 6.1 treats every row of a trial as independent, so its
-    interval is too narrow.
+    Its standard error is that of a ratio over trials (Cochran, Sampling Techniques 1977, eq.
+    2.39), which are independent. The thesis's Eq. 6.1 treats every row of a trial as independent,
+    so its interval is too narrow.
     """
     events = np.asarray(event, dtype=bool)
     counts = np.ones(events.shape, bool) if where is None else np.asarray(where, dtype=bool)
