@@ -59,7 +59,7 @@ macro_rules! scripted {
 pub const EXAMPLES: [Example; 15] = [
     built_in!("quickstart", "", "leader", "Five robots agree on a leader by radio, in seconds"),
     scripted!("dispersion", "Robots spread out; they sense how near others are"),
-    scripted!("aggregation", "Robots gather; they sense how near others are"),
+    scripted!("aggregation", "Robots gather; they sense where others are"),
     scripted!("scent", "Robots find a source with a sensor that the script defines"),
     scripted!("flocking", "Robots travel together; the fitness is a product of three measures"),
     scripted!("foraging", "Robots carry food to a nest; the script remembers the loaded robots"),

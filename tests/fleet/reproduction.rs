@@ -352,7 +352,7 @@ fn champions_are_compared_with_controllers_written_by_hand() {
     let Some(mut command) = python_script(results("by-hand.py")) else { return };
     command.args(["--trials", "3", "synchronisation"]);
     let table = Outcome::of_command(&mut command).expect_success().stdout;
-    let row = table.lines().find(|line| line.starts_with("| synchronisation | ")).unwrap();
+    let row = table.lines().find(|line| line.starts_with("| synchronisation | by hand ")).unwrap();
     assert_eq!(row.matches(" to ").count(), 2, "two means with intervals: {row}");
 }
 
