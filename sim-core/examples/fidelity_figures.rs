@@ -1,5 +1,5 @@
-//! Prints what readings of the thesis change for random networks: the figures of
-//! docs/notebook/2026-11-thesis.md.
+//! Prints the effects of different interpretations of the thesis on random networks: the figures
+//! of docs/notebook/2026-11-thesis.md.
 //!
 //! ```sh
 //! cargo run --release -p sim-core --example fidelity_figures              # a minute

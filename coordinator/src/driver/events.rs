@@ -47,7 +47,7 @@ pub enum DriverEvent {
         experiment: ExperimentId,
         /// The change.
         request: Request,
-        /// Answered once the change is stored; dropped if it is not going to be.
+        /// Answered once the change is stored; dropped if it will never be stored.
         reply: oneshot::Sender<()>,
     },
     /// A client wants to see the workers.

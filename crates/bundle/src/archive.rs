@@ -45,8 +45,7 @@ impl Bundle {
     ///
     /// # Errors
     ///
-    /// If the bundle or one of its files exceeds a limit, so that [`read`](Self::read) would
-    /// refuse it.
+    /// If the bundle exceeds a limit of [`read`](Self::read).
     pub fn to_bytes(&self) -> Result<Vec<u8>, BundleError> {
         let files = self.to_files();
         let description = description::describe(self, &files);

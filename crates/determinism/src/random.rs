@@ -225,9 +225,9 @@ impl Stream {
         standard_normal_quantiles(values);
     }
 
-    /// Fills `values` with uniform numbers in (0, 1), which [`standard_normal_quantiles`] turns
-    /// into those of [`fill_normal`](Self::fill_normal). For callers that draw few numbers each
-    /// from many streams.
+    /// Fills `values` with uniform numbers in (0, 1); [`standard_normal_quantiles`] turns them
+    /// into the draws of [`fill_normal`](Self::fill_normal). For callers that draw few numbers
+    /// each from many streams.
     pub fn fill_probability(&mut self, values: &mut [f64]) {
         values.fill_with(|| self.probability());
     }
