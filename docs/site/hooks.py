@@ -128,7 +128,9 @@ def on_page_content(html, page, config, files):
     def breakable(match):
         return re.sub(r"(?<=[_/.=])(?=\w)", "<wbr>", match[0])
 
-    return re.sub(r"(?<=<code>)[^<]{12,}(?=</code>)", breakable, html)
+    html = re.sub(r"(?<=<code>)[^<]{12,}(?=</code>)", breakable, html)
+    # Its tables have a shape of their own on a phone.
+    return f'<div class="keys">{html}</div>' if page.file.src_uri == "keys.md" else html
 
 
 def _target(source, link):

@@ -57,7 +57,7 @@ impl Example {
     fn config_named(&self, name: &str) -> String {
         let mut lines = vec![
             format!("// {}.", self.about),
-            "// Lengths are cm, angles radians, times steps. Every key: docs/experiment-files.md, or".into(),
+            "// Lengths are cm, angles radians, times steps. Every key: docs/keys.md, or".into(),
             "// in an editor that completes: swarmctl schema > experiment.schema.json".into(),
         ];
         for line in self.config.lines() {

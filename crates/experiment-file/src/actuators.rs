@@ -33,12 +33,12 @@ impl ActuatorsConfig {
 const DT: Also = Also {
     key: "dt",
     max: limits::MAGNITUDE,
-    meaning: "A fifth of it is `step_duration`.",
+    meaning: "In place of `step_duration`, which is a fifth of it.",
     value: |dt| dt / 5.0,
 };
 
 parameters! {
-    /// Differential drive (section 3.2.1).
+    /// Differential drive (section 3.2.1 of the thesis).
     pub struct WheelActuatorConfig: Default {
         /// Wheel speed at action 1, cm/s.
         max_speed: f64 = positive(10.0),
@@ -48,17 +48,17 @@ parameters! {
         step_duration: f64 = positive(0.33).also(DT),
     }
     // A dead zone of no width; the original has others, too.
-    checked { Parameter::between("min_thresh", [0.0; 2], 0.0, "") }
+    checked { Parameter::between("min_thresh", [0.0; 2], 0.0, "Accepted if it is 0") }
 
     /// LED.
     pub struct LedActuatorConfig {}
 
-    /// Emitter of the wireless link (section 3.3).
+    /// Emitter of the wireless link (section 3.3 of the thesis).
     pub struct WirelessTransmitterConfig: Default {
         /// Reach, cm. A frame is heard within the smaller of the emitter's and the receiver's
         /// reach.
         range: f64 = positive(100.0),
-        /// Components of a message, M. Equals the receiver's.
+        /// Components of a message, M. It must equal the receiver's.
         msg_length: u32 = whole([1, limits::MESSAGE_LENGTH], 2),
         /// Whether messages are quantised.
         quantize: bool = switch(true),

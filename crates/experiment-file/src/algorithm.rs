@@ -9,9 +9,9 @@ use crate::Domain;
 use crate::parameters::parameters;
 
 parameters! {
-    /// Evolution and evaluation.
+    /// Evolution: what evolves, by which algorithm, and on which trials.
     pub struct AlgorithmConfig {
-        /// The evolutionary algorithm.
+        /// The algorithm.
         name: String = of(Domain::Text, Required),
         /// Name of the world object whose controller evolves.
         evolvable_object: String = of(Domain::Text, Required),
@@ -23,44 +23,45 @@ parameters! {
         evaluation_steps: u32 = of(Domain::Whole(1, limits::STEPS), Required),
         /// Trials per individual.
         num_evaluations: u32 = of(Domain::Whole(1, limits::TRIALS), Required),
-        /// Fitness of a trial; may be left out if there is a `task`.
+        /// Fitness of a trial. It may be left out if there is a `task`.
         fitness_function: FitnessFunction =
             of(Domain::Variant(FitnessFunction::VARIANTS), Depends("")),
-        /// Constants of the task.
+        /// Constants of fitness functions.
         fitness_params: FitnessParams =
             of(Domain::Object(FitnessParams::OBJECT), Empty).recent(),
         /// Stop when the mean fitness of a generation reaches this.
         target_fitness: Option<f64> = of(Domain::QUANTITY, Null),
-        /// Generations between re-evaluations of candidates for the champion. There is one at the
-        /// end, too.
+        /// Generations from one comparison of candidates for the champion to the next. There is one
+        /// at the end, too.
         champion_every: u64 = whole([1, limits::GENERATIONS as u32], 10),
-        /// Held-out trials of a re-evaluation. Candidates that are close get up to four times as
-        /// many.
+        /// Held-out trials of a comparison. Close candidates get up to four times as many.
         champion_trials: u32 = whole([1, limits::TRIALS], 50),
         // 0 leaves the key out, for digests of generations alone.
-        /// Trials that judge the champion at the end and select nothing.
+        /// Trials that judge the champion at the end of a run and select nothing.
         judgement_trials: u32 = whole([1, limits::TRIALS], 200).unless_zero(),
     }
     parts {
-        /// Populations, in genotype order; several evolve cooperatively.
+        /// Populations, by names that you choose, in the order of the genotype. Several evolve
+        /// together.
         populations: NamedMap<PopulationConfig> = required(schema::map::<PopulationConfig>);
     }
 }
 
-/// One population: its segment of the genotype and its algorithm's parameters.
+/// One population: its part of the genotype, and the parameters of its algorithm, which may also
+/// stand beside these keys instead of in `params`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
     transform = schema::optional("params")
 )]
 pub struct PopulationConfig {
-    /// What its genes encode, in genotype order.
+    /// The parameters of the network that its genes encode, in the order of the genotype.
     #[schemars(length(min = 1, max = limits::ENTRIES))]
     pub objects: Vec<GenotypeQuery>,
-    /// Upper bound of the decoded values, per query.
+    /// Upper bounds of the values: one per query, or one for all.
     #[schemars(schema_with = "schema::number_or_numbers")]
     pub max_vals: Vec<f64>,
-    /// Lower bound of the decoded values, per query.
+    /// Lower bounds of the values: one per query, or one for all.
     #[schemars(schema_with = "schema::number_or_numbers")]
     pub min_vals: Vec<f64>,
     /// Parameters of the algorithm that `algorithm.name` names.

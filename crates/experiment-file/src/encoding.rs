@@ -23,35 +23,40 @@ pub struct EncodingConfig {
 /// How the value x of a node becomes spikes; a substep counts as 1 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum EncodingScheme {
-    /// A LIF neuron with its default parameters gets x as its current: it spikes above 15.
+    /// A LIF neuron with its default parameters gets x as its current. It spikes for x above
+    /// 15 only, so state `max_val`.
     #[serde(rename = "LIF_Encoding")]
     Lif,
     /// Survival s -= 0.001 (x / 10) s per substep; a spike with probability 1 - s, then
-    /// s = 1. x is within 0 and 10,000.
+    /// s = 1. x is cut to the range from 0 to 10,000.
     #[serde(rename = "PoissonRateCoding")]
     PoissonRate,
-    /// One spike per environment step, in substep x rounded down, the first being 1.
+    /// One spike per environment step, in substep x rounded down, the first being 1 (Thorpe and
+    /// Gautrais 1998). x is cut to the range from 1 to `time_scale`, and there must be at least
+    /// as many substeps as nodes.
     #[serde(rename = "RankOrderCoding")]
     RankOrder,
 }
 
 kinds! {
-    /// How the values s of a stimulus become values of nodes. All but the identity and the
-    /// linear field have `n_neurons` nodes per value; d is from s to the node's centre.
+    /// How the values s of a stimulus become values of nodes. With the distance d from s to the
+    /// node's centre and the formula x of the field, a node has the value x (max_val - min_val) +
+    /// min_val. The identity and the linear field have no centres and no such scale.
     #[derive(Copy)]
     pub enum ReceptiveField by "name" then receptive_fields {
         /// s itself, one node per value.
         Identity {} = "identity_receptive_field",
-        /// exp(-sigma d^2)
+        /// x = exp(-sigma d^2). A field that has no name is this one.
         Gaussian(GaussianField) = "gaussian_receptive_field",
-        /// 1 - slope |d|, at least 0
+        /// x = 1 - slope |d|, at least 0.
         Triangular(SlopedField) = "triangular_receptive_field",
-        /// 1 - slope |d|, at least 0
+        /// The same as `triangular_receptive_field`.
         Conic(SlopedField) = "conic_receptive_field",
-        /// 1 - slope d^2, at least 0
+        /// x = 1 - slope d^2, at least 0.
         Parabolic(SlopedField) = "parabolic_receptive_field",
-        /// `n_neurons` nodes for the whole stimulus, each a weighted sum of its values; weights
-        /// can evolve (`encoders:weights`).
+        /// `n_neurons` nodes for the whole stimulus, each a weighted sum of its values. Weights can
+        /// evolve (`encoders:weights:NAME`); others are exp(-|i - c|), with i the number of the
+        /// value from 0, and centres c evenly from 0 to the number of values.
         Linear(LinearField) = "linear_receptive_field",
     }
 }
@@ -69,36 +74,36 @@ parameters! {
     pub struct GaussianField {
         /// Factor of d^2.
         sigma: f64 = between([0.0, limits::STEEPNESS], 6.0),
-        /// Nodes per value.
+        /// Nodes for each value of the stimulus.
         n_neurons: u32 = whole([1, limits::FIELD_NODES], 1),
-        /// Centre of the first node.
+        /// Centre of the first node, or of the only one.
         min_stim: f64 = between(VALUE, 0.0),
-        /// Centre of the last node, if there are two or more; the others are evenly between.
+        /// Centre of the last node, if there are two or more. The others are evenly between.
         max_stim: f64 = between(VALUE, 1.0),
         /// Value of a node far from its centre.
         min_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MIN_VAL),
         /// Value of a node at its centre.
         max_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MAX_VAL),
-        /// Whether `min_val` is at the centre and `max_val` far from it.
+        /// Whether 1 - x takes the place of x: `min_val` is at the centre, `max_val` far from it.
         inverted: bool = switch(false),
     }
 
     /// A field that falls to zero at a finite distance.
     #[derive(Copy)]
     pub struct SlopedField {
-        /// Factor of the distance, or of its square.
+        /// Factor of the distance d, or of its square.
         slope: f64 = between([0.0, limits::STEEPNESS], 5.0),
-        /// Nodes per value.
+        /// Nodes for each value of the stimulus.
         n_neurons: u32 = whole([1, limits::FIELD_NODES], 1),
-        /// Centre of the first node.
+        /// Centre of the first node, or of the only one.
         min_stim: f64 = between(VALUE, 0.0),
-        /// Centre of the last node, if there are two or more; the others are evenly between.
+        /// Centre of the last node, if there are two or more. The others are evenly between.
         max_stim: f64 = between(VALUE, 1.0),
         /// Value of a node far from its centre.
         min_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MIN_VAL),
         /// Value of a node at its centre.
         max_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MAX_VAL),
-        /// Whether `min_val` is at the centre and `max_val` far from it.
+        /// Whether 1 - x takes the place of x: `min_val` is at the centre, `max_val` far from it.
         inverted: bool = switch(false),
     }
 
@@ -106,7 +111,7 @@ parameters! {
     /// the number of the value, and centres c evenly from 0 to their number.
     #[derive(Copy)]
     pub struct LinearField {
-        /// Nodes of the stimulus.
+        /// Nodes for the whole stimulus.
         n_neurons: u32 = whole([1, limits::FIELD_NODES], 1),
     }
 }

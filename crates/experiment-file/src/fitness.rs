@@ -46,7 +46,7 @@ macro_rules! fitness_functions {
         $(#[doc = $doc:literal])*
         $name:literal = $function:ident: [$($need:expr),*],
     )*) => {
-        /// Fitness functions; see `fitness`.
+        /// How the fitness of a trial is computed.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
         pub enum FitnessFunction {
             $(
@@ -82,9 +82,9 @@ fitness_functions! {
     "identify_leader" = IdentifyLeader: [Need::OutputTo(ActuatorQuery::Led)],
     /// Experiment B: robots on the swarm's border have their LED on.
     "identify_borderline" = IdentifyBorderline: [Need::OutputTo(ActuatorQuery::Led)],
-    /// Experiment C, Eq. 5.5.
+    /// Experiment C: robots have the same heading and do not turn (Eq. 5.5).
     "orientation_consensus" = OrientationConsensus: [Need::OutputTo(ActuatorQuery::Wheels)],
-    /// Experiment C as in the original simulator.
+    /// Experiment C as in the original simulator. The first 100 steps do not count.
     "alignment" = Alignment: [
         Need::OutputTo(ActuatorQuery::Wheels),
         Need::StepsBeyond(ALIGNMENT_SETTLING_STEPS)

@@ -7,27 +7,26 @@ use crate::{Domain, limits};
 const COEFFICIENT: [f64; 2] = [-limits::COEFFICIENT, limits::COEFFICIENT];
 
 parameters! {
-    /// How weights change while robots live: before every environment step but the first, each
-    /// weight of a plastic group grows by `learning_rate` R (A x_i x_j + B x_i + C x_j + D), and
-    /// is then cut to `max_weight`. x are the activities of the postsynaptic neuron i and the
-    /// presynaptic side j in the step before: u of rate neurons, the share of substeps with a
-    /// spike of what spikes, the value of a stimulus. R is 1 without `reward`. A group has
-    /// coefficients of its own, which can evolve (`learning:coefficients`).
+    /// How weights change while robots live. In every environment step but the first, a weight
+    /// grows by `learning_rate` times the terms of A, B, C and D, which depend on the activities
+    /// of both neurons. Each group has coefficients of its own, which can evolve
+    /// (`learning:coefficients:NAME`).
     pub struct LearningConfig {
         /// Factor of all changes.
         learning_rate: f64 = unit(1e-4),
-        /// Largest absolute value of a plastic weight.
+        /// Largest absolute value of a plastic weight. Larger ones of a genotype are cut at the
+        /// first change.
         max_weight: f64 = of(
             Domain::Between(0.0, limits::PLASTIC_WEIGHT),
             Depends("10, of spiking neurons 1000"),
         ),
-        /// A of groups whose coefficients do not evolve.
+        /// Coefficient of the product of both activities, where none evolves.
         a as "A": f64 = between(COEFFICIENT, 1.0),
-        /// B, likewise.
+        /// Coefficient of the postsynaptic activity, likewise.
         b as "B": f64 = between(COEFFICIENT, 0.0),
-        /// C, likewise.
+        /// Coefficient of the presynaptic activity, likewise.
         c as "C": f64 = between(COEFFICIENT, 0.0),
-        /// D, likewise.
+        /// Constant term, likewise.
         d as "D": f64 = between(COEFFICIENT, 0.0),
         /// Names of the plastic groups.
         synapses: Vec<String> = of(Domain::Names, Depends("all")),
@@ -38,12 +37,12 @@ parameters! {
             .recent(),
     }
 
-    /// How reward changes weights: x are those of `delay` steps ago, and R is the sum of the
-    /// rewards since then, r + discount r' + discount^2 r'' + ... A reward is the fitness of a
-    /// step, 0 where it does not count.
+    /// How reward changes weights: a change follows from the activities of `delay` steps ago, times
+    /// the discounted sum of the rewards since then. A reward is the fitness of a step, 0 if the
+    /// step does not count.
     #[derive(Copy)]
     pub struct RewardConfig {
-        /// Environment steps.
+        /// Environment steps from the activities to the reward.
         delay: u32 = whole([1, limits::REWARD_DELAY], 30),
         /// Factor of each reward against the one before.
         discount: f64 = unit(0.9),

@@ -87,10 +87,6 @@ mod topology;
 mod variant;
 mod world;
 
-use schemars::JsonSchema;
-use serde::Serialize;
-use serde_json::json;
-
 pub use actuators::*;
 pub use algorithm::*;
 pub use description::{AlgorithmDescription, Keeps, LearnsFrom};
@@ -108,8 +104,10 @@ pub use read::plain;
 pub use report::suggestion;
 pub use robot::*;
 pub use schema::json_schema;
+use schemars::JsonSchema;
 pub use seed::Seed;
 pub use sensors::*;
+use serde::Serialize;
 pub use synapses::*;
 pub use task::*;
 pub use topology::*;
@@ -126,24 +124,24 @@ pub type NamedMap<T> = indexmap::IndexMap<String, T>;
 #[schemars(
     deny_unknown_fields,
     transform = schema::optional("name, seed, task"),
-    transform = schema::property("$schema", json!({"type": "string"})),
+    transform = schema::property("$schema", schema::place_of_schema()),
     transform = schema::property("semantics", schema::semantics()),
-    transform = schema::property("checkpoint_file", json!({"type": ["string", "null"]})),
+    transform = schema::property("checkpoint_file", schema::checkpoint_file()),
     transform = schema::ignored("num_processes, render")
 )]
 pub struct ExperimentConfig {
-    /// Name for display; does not influence the run.
+    /// Name of the experiment, which changes no result; default the file's name.
     pub name: String,
     /// Master seed of all randomness.
     #[schemars(schema_with = "schema::seed", extend("default" = 0))]
     pub seed: u64,
-    /// The neural network's structure.
+    /// The network that every robot has a copy of.
     pub topology: TopologyConfig,
-    /// What evolves, how, and how its fitness is computed.
+    /// What evolves, by which method, and for which goal.
     pub algorithm: AlgorithmConfig,
-    /// Arena, robots, lights, ground areas.
+    /// The arena with its robots, lights and ground areas.
     pub world: WorldConfig,
-    /// A task of the file's own.
+    /// A task of your own, as a script.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "TaskConfig")]
     pub task: Option<TaskConfig>,

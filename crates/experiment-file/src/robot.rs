@@ -27,16 +27,16 @@ pub struct RobotConfig {
     pub actuators: ActuatorsConfig,
     /// Where they start.
     pub initializers: RobotInitializers,
-    /// What goes wrong.
+    /// Faults and disturbances.
     pub perturbations: PerturbationsConfig,
-    /// Switches.
+    /// Whether they may evolve.
     pub params: RobotParams,
 }
 
 /// Controllers of robots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = schema::also("Braitenberg2"))]
+#[schemars(transform = schema::also("Braitenberg2", "braitenberg_light_follower"))]
 pub enum RobotController {
     /// The network of `topology`.
     NeuralController,
@@ -60,9 +60,9 @@ parameters! {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, transform = schema::optional("orientations"))]
 pub struct RobotInitializers {
-    /// Positions.
+    /// Where they are at the start.
     pub positions: Initializer,
-    /// Headings.
+    /// Headings; default `random_uniform` over a full turn.
     pub orientations: Initializer,
 }
 
@@ -109,7 +109,7 @@ parameters! {
         affected_robots: u32 = of(Domain::WholeOrAll(limits::ROBOTS), Depends("all")),
         /// First affected step.
         start: u32 = whole([0, limits::STEPS], 200).original(Whole(101)),
-        /// Target headings, radians, in order.
+        /// Target headings in their order, radians.
         targets: Vec<f64> = of(Domain::Numbers(1, limits::TARGETS), Numbers(TARGETS))
             .shown("270, 90, 15 and 180 degrees"),
         /// Step at which the next target applies.

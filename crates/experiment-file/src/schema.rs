@@ -77,10 +77,11 @@ pub(super) fn add_property(schema: &mut Schema, key: &str, value: Value) {
 }
 
 /// Another name of a variant.
-pub(super) fn also(name: &str) -> impl Fn(&mut Schema) {
+pub(super) fn also(name: &str, variant: &str) -> impl Fn(&mut Schema) {
     move |schema| {
         if let Some(Value::Array(variants)) = schema.get_mut("oneOf") {
-            variants.push(json!({"type": "string", "const": name}));
+            let meaning = format!("Another name of `{variant}`.");
+            variants.push(json!({"type": "string", "const": name, "description": meaning}));
         }
     }
 }
@@ -103,15 +104,15 @@ pub(super) fn food_areas_and_nests(schema: &mut Schema) {
         |variant: &&Value| variant.pointer("/properties/type/const") == Some(&json!("ground_area"));
     let Some(area) = variants.iter().find(is_area).cloned() else { return };
     for (name, description) in [
-        ("food_area", "A green ground area; `range` is 150 cm by default, `color` fixed."),
-        ("nest", "A black ground area; `range` is 150 cm by default, `color` fixed."),
+        ("food_area", "A green ground area, which `food_area_sensor` sees."),
+        ("nest", "A black ground area, which `nest_sensor` sees."),
     ] {
         let mut variant = area.clone();
         variant["properties"]["type"]["const"] = json!(name);
         variant["description"] = json!(description);
         let table = &NamedAreaParams::TABLE;
         variant["properties"]["params"] =
-            parameters::object(table, "", &mut SchemaGenerator::default()).to_value();
+            parameters::object(table, "Radius.", &mut SchemaGenerator::default()).to_value();
         variants.push(variant);
     }
 }
@@ -163,7 +164,7 @@ pub(super) fn script(_: &mut SchemaGenerator) -> Schema {
             "type": "object",
             "properties": {
                 "name": {"type": "string", "description": "Name of its file."},
-                "text": {"type": "string", "description": "Its whole text."},
+                "text": {"type": "string", "description": "Its whole text, at most 32 KiB."},
             },
             "required": ["name", "text"],
             "additionalProperties": false,
@@ -171,13 +172,26 @@ pub(super) fn script(_: &mut SchemaGenerator) -> Schema {
     ]})
 }
 
+/// The schema of the key that names the schema.
+pub(super) fn place_of_schema() -> Value {
+    json!({"type": "string", "description": "Path of the JSON Schema, for editors."})
+}
+
+/// The schema of a key of the original simulator that may name the experiment.
+pub(super) fn checkpoint_file() -> Value {
+    json!({
+        "type": ["string", "null"],
+        "description": "Name of the experiment if there is no `name`.",
+    })
+}
+
 /// The schema of the key that chooses the defaults.
 pub(super) fn semantics() -> Value {
     json!({
         "enum": ["thesis", "original"],
         "default": "thesis",
-        "description": "Whose values the keys have that are left out: the thesis's, or those \
-                        of its Python simulator.",
+        "description": "Whose defaults the file has for keys that it leaves out: those of the \
+                        thesis, or those of SpikeSwarmSim.",
     })
 }
 
@@ -185,7 +199,8 @@ pub(super) fn semantics() -> Value {
 fn neurons() -> Value {
     json!({
         "type": "object",
-        "properties": {"model": {"enum": NeuronModel::names()}},
+        "description": "The neuron model in another form, in place of `neuron_model`.",
+        "properties": {"model": {"enum": NeuronModel::names(), "description": "Its name."}},
         "required": ["model"],
         "additionalProperties": false,
     })

@@ -191,14 +191,14 @@ const SECTORS: [u32; 2] = [1, limits::SECTORS];
 const NOISE_SIGMA: Also = Also {
     key: "noise_sigma",
     max: 31_622.776_601_683_792,
-    meaning: "Its square is `noise_variance`.",
+    meaning: "Standard deviation of the noise; its square is `noise_variance`.",
     value: |sigma| sigma * sigma,
 };
 
 parameters! {
-    /// Receiver of the wireless link (section 3.3).
+    /// Receiver of the wireless link (section 3.3 of the thesis).
     pub struct WirelessReceiverConfig: Default {
-        /// Sectors.
+        /// Number of sectors around the robot.
         n_sectors: u32 = whole(SECTORS, 4).original(Whole(2)),
         /// Reach, cm.
         range: f64 = positive(100.0),
@@ -206,9 +206,9 @@ parameters! {
         msg_length: u32 = whole([1, limits::MESSAGE_LENGTH], 2),
         /// A frame of this many hops is not accepted any more.
         max_hops: u32 = whole([1, limits::HOPS], 10),
-        /// Decay of the strength per cm.
+        /// Decay of a frame's strength with the distance, per cm.
         decay_rho: f64 = amount(0.05).original(Number(0.005)),
-        /// Decay of the strength per radian.
+        /// Decay of a frame's strength with the angle, per radian.
         decay_phi: f64 = amount(1.0),
         /// Whose sector the sending direction is.
         sending_direction: SendingDirection =
@@ -218,17 +218,18 @@ parameters! {
     }
     ignored { "noise_sigma": "reception has no noise"; }
 
-    /// Light sensor.
+    /// Sees lights of one colour. A sector sums exp(-decay_rho distance - decay_phi angle) over
+    /// them, with the angle between the light and the sector's direction.
     pub struct LightSensorConfig: Default {
-        /// Sectors.
+        /// Number of sectors around the robot.
         n_sectors: u32 = whole(SECTORS, 6).original(Whole(2)),
         /// Reach, cm. The light's own range bounds it too.
         range: f64 = positive(80.0).original(Number(100.0)),
         /// Colour it sees.
         color: String = text("red"),
-        /// Decay per cm.
+        /// Decay with the distance, per cm.
         decay_rho: f64 = amount(0.05).original(Number(0.005)),
-        /// Decay per radian.
+        /// Decay with the angle, per radian.
         decay_phi: f64 = amount(1.0),
         /// Variance of the Gaussian noise.
         noise_variance: f64 = amount(0.1).original(Number(0.0)).also(NOISE_SIGMA),
@@ -241,15 +242,16 @@ parameters! {
             .recent(),
     }
 
-    /// Distance sensor.
+    /// Sees other robots. A sector has the largest exp(-decay_rho distance - decay_phi angle) of
+    /// them, with the angle between the robot and the sector's direction.
     pub struct DistanceSensorConfig: Default {
-        /// Sectors.
+        /// Number of sectors around the robot.
         n_sectors: u32 = whole(SECTORS, 4).original(Whole(2)),
         /// Reach, cm.
         range: f64 = positive(60.0).original(Number(100.0)),
-        /// Decay per cm.
+        /// Decay with the distance, per cm.
         decay_rho: f64 = amount(0.05).original(Number(0.005)),
-        /// Decay per radian.
+        /// Decay with the angle, per radian.
         decay_phi: f64 = amount(1.0),
         /// Variance of the Gaussian noise.
         noise_variance: f64 = amount(0.1).original(Number(0.0)).also(NOISE_SIGMA),
@@ -260,7 +262,7 @@ parameters! {
             .recent(),
     }
 
-    /// Ground sensor.
+    /// Sees whether the robot stands on a ground area of one colour.
     pub struct GroundSensorConfig: Default {
         /// Colour it sees.
         color: String = text("black"),

@@ -2,7 +2,7 @@
 
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::limits;
 use crate::neuron::{TIME, VOLTAGE};
@@ -45,7 +45,7 @@ pub struct SynapseParams {
     /// Inhibition.
     #[serde(rename = "GABA")]
     pub gaba: GabaParams,
-    /// Slow excitation; also `NDMA`.
+    /// Slow excitation.
     #[serde(rename = "NMDA")]
     pub nmda: NmdaParams,
 }
@@ -82,7 +82,7 @@ parameters! {
         tau_rise: f64 = between(TIME, 6.0),
         /// Time constant of the decay, ms.
         tau_decay: f64 = between(TIME, 100.0),
-        /// Concentration of magnesium, mM, which blocks them at low v.
+        /// Concentration of magnesium, mM. It blocks the receptors at low v.
         magnesium as "Mg2": f64 = between([0.0, 1_000.0], 0.5),
         /// Reversal potential, mV. With null, the current depends on v by the block only.
         reversal as "E": Option<f64> = between(VOLTAGE, 0.0).or_null(),
@@ -95,7 +95,9 @@ const GAIN: [f64; 2] = [0.0, limits::SYNAPSE_GAIN];
 fn receptors(schema: &mut Schema) {
     schema.remove("required");
     let nmda = schema.pointer("/properties/NMDA").cloned();
-    if let (Some(nmda), Some(Value::Object(properties))) = (nmda, schema.get_mut("properties")) {
+    if let (Some(mut nmda), Some(Value::Object(properties))) = (nmda, schema.get_mut("properties"))
+    {
+        nmda["description"] = json!("Another name of `NMDA`.");
         properties.insert("NDMA".to_owned(), nmda);
     }
 }

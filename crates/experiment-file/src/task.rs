@@ -9,11 +9,12 @@ use serde::Serialize;
 
 use crate::{read, schema};
 
-/// A task of the file's own.
+/// A task of your own.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct TaskConfig {
-    /// What computes fitness and measures, each step.
+    /// The script that computes fitness and measures, as a path from the experiment file or as
+    /// an object.
     #[schemars(schema_with = "schema::script")]
     pub script: ScriptConfig,
 }

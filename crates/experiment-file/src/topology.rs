@@ -14,26 +14,25 @@ use crate::{Domain, Parameter};
 parameters! {
     /// Structure of the network; its trainable values come from the genotype.
     pub struct TopologyConfig then schema::with_neurons {
-        /// Euler step of the network: of rate neurons in seconds, default 0.1; of spiking ones
-        /// in ms, default 1, at most 2.
-        dt: f64 = of(Domain::Positive, Depends("")),
+        /// Euler step of the network. Spiking neurons take 0.001 to 2 ms.
+        dt: f64 = of(Domain::Positive, Depends("0.1 s, of spiking neurons 1 ms")),
         /// Network substeps per environment step.
         time_scale: u32 = whole([1, limits::TIME_SCALE], 20),
-        /// Seed of the random connections (and of fixed weights).
+        /// Seed of random connections, and of weights and delays that do not evolve.
         seed: u64 = of(Domain::Seed, Whole(821)),
-        /// How the neurons work.
+        /// How the neurons work. `ctrnn` is another name of `rate_model`.
         neuron_model: NeuronModel =
             of(Domain::Variant(NeuronModel::VARIANTS), Name("rate_model")).recent(),
         /// Of rate neurons: whether the gain multiplies the bias, u = F(g (v + beta))
         /// (Eq. 2.2), or not, u = F(g v + beta).
         bias_in_gain: bool = switch(true).original(Switch(false)).recent(),
-        /// What rate neurons show until their first substep.
+        /// Activities of rate neurons before their first substep.
         initial_rates: InitialRates =
             of(Domain::Variant(InitialRates::VARIANTS), Name("activation"))
             .original(Name("zero"))
             .recent(),
         /// Time constant of all rate neurons that an output reads, whatever the genotype
-        /// says, seconds.
+        /// says, s.
         motor_tau: Option<f64> = positive(0.0)
             .null()
             .shown("null: that of the genotype")
@@ -44,27 +43,27 @@ parameters! {
             of(Domain::Variant(SynapseModel::VARIANTS), Name("static_synapse")).recent(),
     }
     parts {
-        /// The receptors of dynamic synapses; ignored by static ones.
+        /// The receptors of dynamic synapses. Static synapses ignore them.
         synapse_params: Option<SynapseParams> =
             optional(|generator| generator.subschema_for::<SynapseParams>())
             unless Option::is_none;
-        /// Inputs, in the order in which they are stacked.
+        /// Inputs of the network, by names that you choose.
         stimuli: NamedMap<StimulusConfig> = required(schema::map::<StimulusConfig>);
         /// How stimuli become spikes. A stimulus without an entry, or with `IdentityEncoding`,
         /// acts as it is.
         encoding: NamedMap<EncodingConfig> =
             optional(encoding::entries) unless NamedMap::is_empty;
-        /// Groups of neurons, in the order in which they are numbered.
+        /// Groups of neurons, by names that you choose. Their order numbers the neurons.
         ensembles: NamedMap<EnsembleConfig> = required(schema::map::<EnsembleConfig>);
         /// Which ensemble drives which actuator.
         outputs: NamedMap<OutputConfig> = required(schema::map::<OutputConfig>);
-        /// Groups of synapses.
+        /// Groups of synapses, by names that you choose. No two groups connect the same pair.
         synapses: NamedMap<SynapseGroupConfig> = required(schema::map::<SynapseGroupConfig>);
         /// How weights change while robots live; default null: they do not.
         learning: Option<LearningConfig> =
             optional(|generator| generator.subschema_for::<Option<LearningConfig>>())
             unless Option::is_none;
-        /// How activities become actions; one entry per output, same names.
+        /// How activities become actions: an entry for each of `outputs`, with the same name.
         decoding: NamedMap<DecodingConfig> = required(schema::map::<DecodingConfig>);
     }
 }
@@ -81,7 +80,7 @@ impl TopologyConfig {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InitialRates {
-    /// What follows from v: F(g beta), or F(beta) without `bias_in_gain`.
+    /// The activity that follows from v = 0: F(g beta), or F(beta) without `bias_in_gain`.
     #[default]
     Activation,
     /// 0.
@@ -89,7 +88,7 @@ pub enum InitialRates {
 }
 
 parameters! {
-    /// One named input of the network.
+    /// An input of the network.
     pub struct StimulusConfig {
         /// Number of values; equals the length of the reading.
         n: u32 = of(Domain::Whole(1, limits::INPUTS), Required),
@@ -105,7 +104,7 @@ parameters! {
         actuator: ActuatorQuery = of(Domain::Variant(ActuatorQuery::VARIANTS), Required),
     }
     // Repeats a value of the decoding; nothing depends on it.
-    checked { Parameter::one_of("enc", &["real", "cat"], &[], "") }
+    checked { Parameter::one_of("enc", &["real", "cat"], &[], "Without effect: the decoding says it") }
 }
 
 variants! {
@@ -130,16 +129,17 @@ pub enum Activation {
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 pub enum ActuatorQuery {
-    /// Wheels: 2 neurons (right, left), or 1 for rotation in place (w, -w).
+    /// Wheels: 2 values, right and left, or 1 value w for rotation in place, (w, -w).
     #[serde(rename = "wheel_actuator")]
     Wheels,
-    /// LED colour.
+    /// LED: 1 value, on or off, or a neuron for each of 2 or more colours.
     #[serde(rename = "led_actuator")]
     Led,
-    /// Message of the frame; `msg_length` neurons.
+    /// Message of the frame: `msg_length` values.
     #[serde(rename = "wireless_transmitter")]
     Message,
-    /// Communication mode, 1 send, 0 relay.
+    /// Communication mode, 1 send, 0 relay: 1 value, or with `FirstToSpike` 2 neurons, relay and
+    /// send.
     #[serde(rename = "wireless_transmitter:state")]
     Mode,
 }
@@ -171,8 +171,8 @@ parameters! {
     }
     ignored { "ntx_fixed": "static synapses have no neurotransmitter"; }
     parts {
-        /// Of dynamic synapses, what their spikes release: `AMPA`, `AMPA+NMDA` or `GABA`; default
-        /// `AMPA`. Ignored by static ones.
+        /// What spikes of dynamic synapses release: `AMPA`, `AMPA+NMDA` or `GABA`; default
+        /// `AMPA`. Static synapses ignore it. `AMPA+NDMA` is another name of `AMPA+NMDA`.
         transmitter as "neuroTX": Option<Neurotransmitter> =
             optional(|_| json_schema!({})) unless Option::is_none;
     }
@@ -183,49 +183,52 @@ parameters! {
         n: u32 = of(Domain::Whole(1, limits::NEURONS), Required),
     }
     parts {
-        /// Activation function F; default sigmoid. None for a neuron model without one.
+        /// Activation function F of rate neurons; default `sigmoid`. It may stand in `params`, too.
         activation: Option<Activation> =
             optional(|generator| generator.subschema_for::<Activation>()) unless Option::is_none;
-        /// Values for parameters that no query of the genotype covers: all parameters of
-        /// the neuron model, by name.
+        /// Parameters of the neuron model that no query of the genotype covers, by name.
         params: NamedMap<f64> = optional(neuron::params_schema);
     }
 }
 
 kinds! {
-    /// How what an output's ensemble does becomes an action: the first three for rate neurons,
-    /// from activities u; the others for spiking ones, from the spikes of the environment step.
+    /// How an output's ensemble becomes an action. The first three are for rate neurons and read
+    /// activities u; the others are for spiking neurons and read the spikes of the environment
+    /// step.
     #[derive(Copy)]
     pub enum DecodingConfig by "scheme" {
-        /// The activities themselves.
+        /// The activities themselves, for wheels or a message.
         IdentityDecoding {} = "IdentityDecoding",
-        /// One bit per neuron.
+        /// One bit per neuron, for an LED, a mode, wheels or a message.
         ThresholdDecoding {
             /// false: u >= 0.5. true: Bernoulli(u).
             stochastic: bool = switch(false),
         } = "ThresholdDecoding",
-        /// One category, drawn from softmax(u).
+        /// One category, drawn from softmax(u), for an LED of several colours.
         SoftmaxDecoding {} = "SoftmaxDecoding",
-        /// The index of the neuron that spiked first: the lowest of those that did at once, 0
-        /// if none has.
+        /// One category, the index of the neuron that spiked first, for an LED of several colours or
+        /// a mode. The lowest index wins a tie, and it is 0 if no neuron spiked.
         FirstToSpike {} ignored("num_outputs": "there are as many as neurons") = "FirstToSpike",
-        /// Sum over neurons of weight * spikes * 0.25^rank; the rank is how many neurons of
-        /// the ensemble spiked before it for the first time.
+        /// Sum over neurons of weight * spikes * 0.25^rank. The rank of a neuron is the number of
+        /// neurons whose first spike came before its own.
         RankOrderDecoding {
-            /// Values that it yields, each with weights of its own.
+            /// Values that it yields, each with weights of its own: 1 or 2 for wheels, 1 for an LED
+            /// or a mode, which is on from 0.5, and `msg_length` for a message.
             num_outputs: u32 = whole([1, limits::MESSAGE_LENGTH], 1),
         } = "RankOrderDecoding",
         /// sigmoid(3 W a) + rest_value - 0.5, where a follows each neuron's spikes: it rises
-        /// within 5 ms of one and decays with 30 ms.
+        /// within 5 ms of a spike and decays with 30 ms. One neuron alone decides nothing with
+        /// the default `rest_value`: give an LED two.
         LinearPopulationDecoding {
-            /// Values that it yields, each with weights of its own.
+            /// Values that it yields, each with weights of its own: 1 or 2 for wheels, 1 for an LED
+            /// or a mode, which is on from 0.5, and `msg_length` for a message.
             num_outputs: u32 = whole([1, limits::MESSAGE_LENGTH], 1),
-            /// What it yields where W a = 0.
+            /// The value that it yields where W a = 0.
             rest_value: f64 = between([-1.0, 1.0], 0.5),
         } = "LinearPopulationDecoding",
     }
     // Repeats a value of the scheme; nothing depends on it.
-    checked { Parameter::switch("is_cat", false, "") }
+    checked { Parameter::switch("is_cat", false, "Without effect: the scheme says it") }
 }
 
 impl DecodingConfig {

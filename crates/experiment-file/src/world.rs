@@ -20,7 +20,8 @@ parameters! {
         "world_delay", "render_connections": "it concerns the original simulator's window";
     }
     parts {
-        /// Robots, lights, ground areas; their order numbers the robots.
+        /// Robots, lights and ground areas, by names that you choose. Their order numbers the
+        /// robots.
         objects: NamedMap<ObjectConfig> = required(schema::map::<ObjectConfig>);
     }
 }
@@ -51,7 +52,8 @@ impl ObjectConfig {
 }
 
 kinds! {
-    /// Draws start values (section 5 of the simulation's specification).
+    /// How start values are drawn: positions on the torus, or headings, which take `fixed` and
+    /// `random_uniform` only.
     pub enum Initializer by "name" {
         /// Given values, one per object; a single one serves all.
         Fixed {
@@ -69,17 +71,17 @@ kinds! {
         } = "random_uniform",
         /// Uniform on a circle.
         RandomCircumference {
-            /// Radius, cm.
+            /// Radius of the circle, cm.
             radius: f64 = amount(130.0),
-            /// Centre, cm.
+            /// Centre of the circle, cm.
             center: [f64; 2] = of(Domain::Numbers(2, 2), Depends(CENTRE)),
         } = "random_circumference",
         /// A connected, compact random geometric graph.
         RandomGraph {
-            /// Scale of the graph, cm: beyond half of it from the centre, steps turn
+            /// Scale of the graph, cm. Beyond half of it from the centre, steps turn
             /// tangential.
             max_rad: f64 = positive(300.0),
-            /// First robot, and centre, cm.
+            /// Place of the first robot and centre of the graph, cm.
             initial_pos: [f64; 2] = of(Domain::Numbers(2, 2), Depends(CENTRE)),
         } = "random_graph",
     }
@@ -98,11 +100,11 @@ pub struct LightSourceConfig {
     /// Number of lights.
     #[schemars(range(min = 1, max = limits::STATIC_OBJECTS))]
     pub num_instances: u32,
-    /// How they move.
+    /// How they move; default null: they stand still.
     pub controller: LightController,
     /// Where they start.
     pub initializers: PositionInitializers,
-    /// Physical properties.
+    /// Reach and colour.
     pub params: LightParams,
 }
 
@@ -141,11 +143,11 @@ parameters! {
     /// A light's way to random targets.
     #[derive(Copy)]
     pub struct RandomTargetsConfig: Default {
-        /// Period at which the target is redrawn, steps.
+        /// Period at which the target is drawn anew, steps.
         every: u32 = whole([1, limits::STEPS], 50),
         /// Side of the square around the centre of the world that targets are drawn from, cm.
         square: f64 = amount(200.0).recent(),
-        /// Way per step, cm: it passes its target and turns back.
+        /// Way per step, cm. The light passes its target and turns back.
         speed: Option<f64> = amount(3.0),
         /// alpha of Eq. 6.4: share of the remaining way covered per step, instead of `speed`.
         step: Option<f64> = of(Domain::Between(0.0, 1.0), Null).instead_of("speed"),
@@ -153,9 +155,9 @@ parameters! {
 
     /// Physical properties of a light.
     pub struct LightParams: Default {
-        /// Reach, cm.
+        /// Reach, cm. No sensor sees the light from beyond it.
         range: f64 = positive(80.0).original(Number(150.0)),
-        /// Colour.
+        /// Colour, which sensors of the same colour see.
         color: String = text("red"),
     }
     ignored { "static": "`controller` says how a light moves"; }
@@ -164,7 +166,7 @@ parameters! {
     pub struct GroundAreaParams: Default {
         /// Radius, cm.
         range: f64 = positive(100.0),
-        /// Colour.
+        /// Colour, which sensors of the same colour see.
         color: String = text("black"),
     }
 
@@ -179,7 +181,7 @@ parameters! {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, transform = schema::ignored("orientations"))]
 pub struct PositionInitializers {
-    /// Positions.
+    /// Where they are at the start.
     pub positions: Initializer,
 }
 
@@ -194,12 +196,12 @@ pub struct GroundAreaConfig {
     /// Number of discs.
     #[schemars(range(min = 1, max = limits::STATIC_OBJECTS))]
     pub num_instances: u32,
-    /// How they move; null: they do not.
+    /// How they move; default null: they do not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controller: Option<AreaController>,
-    /// Where they are.
+    /// Where they start.
     pub initializers: PositionInitializers,
-    /// Physical properties.
+    /// Radius and colour.
     pub params: GroundAreaParams,
 }
 

@@ -1,8 +1,8 @@
 //! The evolutionary algorithms, behind one interface: draw a generation, learn from its fitness.
 //!
 //! An algorithm is one file, which implements [`Strategy`] and [`Described`], and one row of the
-//! registry below. Its names, parameters and limits in experiment files, in their JSON Schema and
-//! in `docs/algorithms.md` follow from its description.
+//! registry below. Its names, parameters and limits in experiment files, in their JSON Schema,
+//! in `docs/keys.md` and in `docs/algorithms.md` follow from its description.
 
 mod cma_es;
 mod cumulation;

@@ -8,4 +8,4 @@ pub const MU_INIT: Parameter = Parameter::unit("mu_init", 0.5, "First mean of ev
 pub const SIGMA_INIT: Parameter =
     Parameter::deviation("sigma_init", 0.2, "First standard deviation of every gene");
 /// How fast the mean moves, in natural evolution strategies.
-pub const ETA_MU: Parameter = Parameter::positive("eta_mu", 1.0, "Learning rate of mu");
+pub const ETA_MU: Parameter = Parameter::positive("eta_mu", 1.0, "Learning rate of the mean mu");

@@ -24,8 +24,11 @@ pub struct Snes {
     eta_sigma: f64,
 }
 
-const ETA_SIGMA: Parameter =
-    Parameter::computed("eta_sigma", "(3 + ln d)/(5 sqrt d)", "Learning rate of sigma");
+const ETA_SIGMA: Parameter = Parameter::computed(
+    "eta_sigma",
+    "(3 + ln d)/(5 sqrt d)",
+    "Learning rate of the deviations sigma",
+);
 
 impl Described for Snes {
     const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {

@@ -40,7 +40,7 @@ const SHAPE_MAX: f64 = 1e100;
 const ETA_SIGMA: Parameter = Parameter::computed(
     "eta_sigma",
     "(9 + 3 ln d)/(5 d sqrt d); `fast`: (3 + ln d)/(5 sqrt d)",
-    "Learning rate of sigma",
+    "Learning rate of the step size sigma",
 );
 const ETA_B: Parameter = Parameter::computed(
     "eta_B",
@@ -56,7 +56,7 @@ const RATES: Parameter = Parameter::of(
     "rates",
     Domain::OneOf { names: &["paper", FAST], unsupported: &[] },
     DefaultValue::Formula("`paper`"),
-    "Which learning rates are the defaults",
+    "Which learning rates are the defaults. New files should state `fast`",
 );
 
 impl Described for Xnes {

@@ -2,7 +2,7 @@
 //!
 //! An algorithm states its name, its parameters with their domains and defaults, and its limits
 //! once, as an [`AlgorithmDescription`], next to its code in the crate `evolution`. The reader,
-//! the JSON Schema, the checks and the table in `docs/algorithms.md` all follow from the list of
+//! the JSON Schema, the checks, `docs/keys.md` and the table in `docs/algorithms.md` follow from the list of
 //! descriptions, which is an argument of
 //! [`ExperimentConfig::from_json`](crate::ExperimentConfig::from_json). So this crate knows no
 //! algorithm, and programs that only simulate need none.

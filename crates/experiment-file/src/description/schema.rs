@@ -42,7 +42,8 @@ pub(crate) fn describe_algorithms(schema: &mut Value, algorithms: &[AlgorithmDes
 fn properties(algorithm: &AlgorithmDescription) -> Map<String, Value> {
     let mut properties =
         parameters::properties(algorithm.parameters, &mut SchemaGenerator::default());
-    properties.insert("encoding".to_owned(), json!({"const": "real"}));
+    let encoding = json!({"const": "real", "description": "Accepted and ignored."});
+    properties.insert("encoding".to_owned(), encoding);
     for key in GENETIC_KEYS {
         properties.entry(key).or_insert_with(|| json!({"description": "Accepted and ignored."}));
     }

@@ -18,6 +18,7 @@ use std::ops::RangeInclusive;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};
+use serde_json::json;
 
 use super::{Activation, NamedMap};
 use crate::{Domain, Parameter, ParameterValue, Variants, parameters};
@@ -228,9 +229,16 @@ pub(super) fn params_schema(generator: &mut SchemaGenerator) -> Schema {
         let spec = model.spec();
         let mut properties = parameters::properties(&spec.table(), &mut SchemaGenerator::default());
         if spec.activation.is_some() {
-            properties.insert("activation".to_owned(), activation.clone().to_value());
+            let mut activation = activation.clone().to_value();
+            activation["description"] = json!("The same as `activation` beside `params`.");
+            properties.insert("activation".to_owned(), activation);
         }
-        json_schema!({"type": "object", "properties": properties, "additionalProperties": false})
+        json_schema!({
+            "type": "object",
+            "title": model.name(),
+            "properties": properties,
+            "additionalProperties": false,
+        })
     };
     json_schema!({"anyOf": NeuronModel::ALL.map(of_model)})
 }

@@ -7,8 +7,7 @@ use crate::limits::MAGNITUDE;
 
 const POSITIVE: [f64; 2] = [1.0 / MAGNITUDE, MAGNITUDE];
 const QUANTITY: [f64; 2] = [-MAGNITUDE, MAGNITUDE];
-const TAU: &str = "Time constant. The default is 2 * 10^0 on the scale of Table 3.3. A gene is an \
-                   exponent x: tau = 2 * 10^x.";
+const TAU: &str = "Time constant. A gene is an exponent x: tau = 2 * 10^x.";
 
 pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
     names: &["rate_model", "ctrnn"],

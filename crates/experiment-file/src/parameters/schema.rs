@@ -10,7 +10,9 @@ use crate::{limits, schema};
 pub(crate) fn object(table: &Table, meaning: &str, generator: &mut SchemaGenerator) -> Schema {
     let mut properties = properties(table.parameters, generator);
     for parameter in table.checked {
-        properties.insert(parameter.key.to_owned(), parameter.values(generator));
+        let mut schema = parameter.values(generator);
+        schema["description"] = json!(format!("{}.", parameter.meaning));
+        properties.insert(parameter.key.to_owned(), schema);
     }
     for key in table.ignored.iter().flat_map(|(keys, _)| *keys) {
         properties.insert((*key).to_owned(), json!({"description": "Accepted and ignored."}));

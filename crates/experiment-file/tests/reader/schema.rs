@@ -90,5 +90,5 @@ fn the_schema_carries_descriptions_and_defaults() {
     let schema = json_schema(ALGORITHMS);
     let receiver = &schema["$defs"]["WirelessReceiverConfig"]["properties"]["n_sectors"];
     assert_eq!(receiver["default"], json!(4));
-    assert_eq!(receiver["description"], json!("Sectors; default 4."));
+    assert_eq!(receiver["description"], json!("Number of sectors around the robot; default 4."));
 }

@@ -40,7 +40,11 @@ pub const OPERATOR: Parameter = Parameter::one_of(
     "How two parents yield two children",
 );
 /// The reach of BLX-alpha beyond the parents.
-pub const ALPHA: Parameter = Parameter::amount("alpha", 0.5, "BLX-alpha's alpha");
+pub const ALPHA: Parameter = Parameter::amount(
+    "alpha",
+    0.5,
+    "How far `blxalpha` and `combination` reach beyond the parents",
+);
 
 impl Crossover {
     /// The configured operator.

@@ -41,8 +41,11 @@ const CROSSOVER_PROB: Parameter =
     Parameter::unit("crossover_prob", 0.9, "Probability that a pair is crossed");
 const MUTATION_PROB: Parameter =
     Parameter::unit("mutation_prob", 0.05, "Probability that a gene mutates");
-const NUM_ELITE: Parameter =
-    Parameter::below_population_size("num_elite", 3, "Individuals that survive unchanged");
+const NUM_ELITE: Parameter = Parameter::below_population_size(
+    "num_elite",
+    3,
+    "Individuals that survive unchanged, fewer than `population_size`",
+);
 
 impl Described for Ga {
     const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {

@@ -34,7 +34,7 @@ pub const OPERATOR: Parameter = Parameter::one_of(
 pub const SIGMA: Parameter = Parameter::amount(
     "mutation_sigma",
     0.547_722_557_505_166_1,
-    "Standard deviation of Gaussian mutation",
+    "Standard deviation of `gaussian` mutation. The default is sqrt(0.3)",
 );
 
 /// If the bounds of a parameter differ by the number of categories, its values are whole numbers.
@@ -43,7 +43,7 @@ pub const CATEGORIES: Parameter = Parameter::of(
     "mutation_categories",
     Domain::Whole(2, 1_000_000),
     DefaultValue::Formula("2"),
-    "Values of a gene that `categorical` mutation chooses from",
+    "Number of values of a gene that `categorical` mutation chooses from",
 );
 
 impl Mutation {
