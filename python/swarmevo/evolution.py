@@ -48,7 +48,7 @@ class Evolution:
     def __init__(
         self, n_genes: int, *, population_size: int = 20, seed: int = 0, **params: float | str
     ) -> None:
-        """``n_genes``: d, at least 1. ``params``: as in experiment files; ``docs/algorithms.md``
+        """``n_genes``: d, at least 1. ``params``: as in experiment files; ``docs/keys.md``
         and :func:`algorithms` list them. Warns (``EvolutionWarning``) of a population too small to learn
         from."""
         if type(self) is Evolution:
