@@ -192,7 +192,7 @@ fn tensorboard_reads_the_history() {
         assert_eq!(scalars.len(), 3, "{tag}");
         for (step, (scalar, row)) in scalars.iter().zip(&bundle.history).enumerate() {
             assert_eq!(scalar[0], step);
-            assert_eq!(scalar[1].as_f64().unwrap() as f32, value(&row.statistics) as f32);
+            assert_eq!(scalar[1].as_f64().unwrap() as f32, value(&row.statistics()) as f32);
             assert_eq!(scalar[2].as_f64().unwrap(), row.completed_at_ms as f64 / 1000.0);
         }
     }
