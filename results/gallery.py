@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""Prints the table of docs/gallery.md: how well champions and hand-written controllers solve each task.
+
+    results/gallery.py              from results/by-hand.csv, which by-hand.py --record writes
+    results/gallery.py --update     writes it into that page
+
+A task is solved by a seed if its champion is in a solved state, which the task's script defines, in 80 % of
+the last third of the episodes, on average over all trials. Needs Python 3.9 and nothing else.
+"""
+
+import csv
+import statistics
+import sys
+
+from report import RESULTS, read_csv
+
+PAGE = RESULTS.parent / "docs" / "gallery.md"
+BEGIN, END = "<!-- generated: gallery -->\n", "<!-- end: gallery -->"
+ORDER = ["aggregation", "chain", "flocking", "synchronisation", "division_of_labour", "foraging", "dispersion", "predator"]
+ENOUGH = 0.8
+HEAD = ["task", "seeds that solve it", "share solved", "fitness", "minutes", "share solved by hand", "fitness by hand"]
+
+
+def estimate(row, key):
+    return f"{float(row[key]):.3f} ({float(row[key + '_low']):.3f} to {float(row[key + '_high']):.3f})"
+
+
+def middle(rows, key):
+    """The median champion with its interval, then the least and the greatest."""
+    rows = sorted(rows, key=lambda row: float(row[key]))
+    return f"{estimate(rows[(len(rows) - 1) // 2], key)}; {float(rows[0][key]):.3f} to {float(rows[-1][key]):.3f}"
+
+
+def minutes(task, seed):
+    history = read_csv(RESULTS / "histories" / f"{task}-{seed}.csv")
+    return sum(int(row["duration_ms"]) for row in history) / 60_000
+
+
+def line(task, rows):
+    hand = next(row for row in rows if row["controller"] == "by hand")
+    evolved = [row for row in rows if row is not hand]
+    solving = [row for row in evolved if float(row["solved"]) >= ENOUGH]
+    times = [minutes(task, row["controller"].split()[1]) for row in evolved]
+    return [task, f"{len(solving)} of {len(evolved)}", middle(evolved, "solved"), middle(evolved, "fitness"),
+            f"{statistics.median(times):.1f}", estimate(hand, "solved"), estimate(hand, "fitness")]
+
+
+def table():
+    with (RESULTS / "by-hand.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    lines = [HEAD, ["---"] * len(HEAD)]
+    lines += [line(task, [row for row in rows if row["task"] == task]) for task in ORDER]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def main():
+    if sys.argv[1:] == ["--update"]:
+        before, rest = PAGE.read_text().split(BEGIN)
+        PAGE.write_text(before + BEGIN + "\n" + table() + "\n" + END + rest.split(END)[1])
+    else:
+        print(table(), end="")
+
+
+if __name__ == "__main__":
+    main()
