@@ -11,7 +11,7 @@ import socket
 import threading
 import time
 import uuid
-from concurrent.futures import ProcessPoolExecutor
+from concurrent import futures
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType, TracebackType
@@ -221,7 +221,7 @@ class _OfExecutor:
 def _forks(executor: Submits) -> bool:
     # No public attribute tells how a pool starts its processes.
     context = getattr(executor, "_mp_context", None)
-    return isinstance(executor, ProcessPoolExecutor) and (
+    return isinstance(executor, futures.ProcessPoolExecutor) and (
         context is not None and context.get_start_method() == "fork"
     )
 

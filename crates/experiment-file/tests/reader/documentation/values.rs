@@ -184,7 +184,7 @@ fn range(value: &Value, unit: &str) -> String {
         "1/ms" => " per ms".to_owned(),
         unit => format!(" {unit}"),
     };
-    let range = match (bound("minimum"), bound("exclusiveMinimum"), bound("maximum")) {
+    match (bound("minimum"), bound("exclusiveMinimum"), bound("maximum")) {
         (Some(min), _, Some(max)) if max == 1.0 - f64::EPSILON => {
             format!("{} or more, below 1", number(min))
         }
@@ -196,8 +196,7 @@ fn range(value: &Value, unit: &str) -> String {
         (None, Some(min), None) => format!("above {}{unit}", number(min)),
         (None, None, Some(max)) => format!("up to {}{unit}", number(max)),
         (None, None, None) => String::new(),
-    };
-    range
+    }
 }
 
 /// With commas between thousands.
