@@ -133,7 +133,8 @@ def evaluation(folder):
     shown = sorted({step for step in STEPS if step < end} | {end})
     rows = []
     for (metric, condition), of in sorted(medians.items()):
-        at = lambda step: of[max(known for known in of if known <= step)]
+        # A measure may begin late in an episode.
+        at = lambda step: of.get(max((known for known in of if known <= step), default=None), "")
         rows.append([metric, condition, *(at(step) for step in shown)])
     table(["measure", "condition", *shown], rows)
 
