@@ -45,7 +45,7 @@ def test_reports_say_where_networks_settle():
     assert hears.startswith("Held at msg (1, 0) and receiving_direction (") and "OUT_LED_0 at 0.0" in hears
     assert alone.startswith("Held at nothing") and alone.endswith("OUT_MODE_0 at 1.0 and OUT_LED_0 at 1.0.")
     (alike,) = said_of("borderline")
-    assert alike.startswith("Held at any of the 4 inputs") and alike.endswith("OUT_LED_0 at 1.0.")
+    assert alike.startswith("Held at any of the 4 most frequent inputs") and alike.endswith("OUT_LED_0 at 1.0.")
 
 
 class TestLeaderSelection:

@@ -137,7 +137,7 @@ async fn what_went_wrong_is_said_in_one_line() {
     for (path, status, part) in [
         ("/api/experiments/9", StatusCode::NOT_FOUND, "there is no experiment 9"),
         ("/api/replay/1", StatusCode::CONFLICT, "has no champion yet"),
-        ("/api/replay/x", StatusCode::BAD_REQUEST, "names nobody"),
+        ("/api/replay/x", StatusCode::BAD_REQUEST, "names no genotype"),
         ("/api/workers", StatusCode::CONFLICT, "only a coordinator"),
         ("/api/experiments/x", StatusCode::BAD_REQUEST, "an experiment has a number"),
         ("/api/experiments/-1/events", StatusCode::BAD_REQUEST, "an experiment has a number"),
