@@ -1,8 +1,10 @@
 //! The page on `coordinator` and `worker` has their own help texts.
 
-use std::{env, fmt::Write, fs, process::Command};
+use std::{fmt::Write, process::Command};
 
-use harness::{binary, workspace_file};
+use harness::binary;
+
+use super::expect_page;
 
 const PAGE: &str = "docs/programs.md";
 
@@ -25,15 +27,5 @@ fn the_page_on_programs_has_their_help() {
         let help = lines.join("\n");
         write!(expected, "\n## {program}\n\n```text\n{}\n```\n", help.trim_end()).unwrap();
     }
-    let path = workspace_file(PAGE);
-    if env::var_os("UPDATE_DOCS").is_some() {
-        fs::write(path, &expected).unwrap();
-    } else {
-        let page = fs::read_to_string(path).unwrap();
-        assert!(
-            page == expected,
-            "{PAGE} is out of date: UPDATE_DOCS=1 cargo test -p fleet-tests --test documents \
-             programs::"
-        );
-    }
+    expect_page(PAGE, &expected);
 }

@@ -1,7 +1,7 @@
-//! The page on metrics and the dashboard use only existing metrics, and a real Prometheus has
+//! The dashboard uses only existing metrics, and a real Prometheus has
 //! data for every panel.
 
-use std::{collections::BTreeSet, env, fs, thread, time::Duration};
+use std::{collections::BTreeSet, fs, thread, time::Duration};
 
 use harness::{
     CoordinatorProcess, Experiment, Prometheus, WorkerProcess, metrics_address,
@@ -11,7 +11,6 @@ use serde_json::Value;
 use swarm_telemetry::{Kind, Metric};
 
 const INSTALL: &str = "apt-get install prometheus";
-const PAGE: &str = "docs/metrics.md";
 
 fn all_metrics() -> Vec<&'static Metric> {
     coordinator::metrics::METRICS.iter().chain(worker::metrics::METRICS).collect()
@@ -38,42 +37,6 @@ fn panels() -> Vec<(String, Vec<String>)> {
 fn names_in(expression: &str) -> impl Iterator<Item = &str> {
     let words = expression.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
     words.filter(|word| word.starts_with("swarm_"))
-}
-
-/// The table of a program's metrics.
-fn table(metrics: &[Metric]) -> String {
-    let row = |metric: &Metric| {
-        let labels: Vec<String> = metric.labels.iter().map(|label| format!("`{label}`")).collect();
-        let (name, kind, labels) = (metric.name, metric.kind.name(), labels.join(", "));
-        format!("| `{name}` | {kind} | {labels} | {} |\n", metric.help).replace("|  |", "| |")
-    };
-    let rows: String = metrics.iter().map(row).collect();
-    format!("| name | type | labels | meaning |\n|---|---|---|---|\n{rows}")
-}
-
-/// `page` with the part between the markers of `name` replaced.
-fn with_part(page: &str, name: &str, part: &str) -> String {
-    let (begin, end) = (format!("<!-- generated: {name} -->\n"), format!("<!-- end: {name} -->"));
-    let (before, rest) = page.split_once(&begin).expect("the page has the marker");
-    let (_, after) = rest.split_once(&end).expect("the page has the end marker");
-    format!("{before}{begin}\n{part}\n{end}{after}")
-}
-
-#[test]
-fn the_page_on_metrics_has_the_tables_of_the_programs() {
-    let path = workspace_file(PAGE);
-    let page = fs::read_to_string(&path).unwrap();
-    let expected = with_part(&page, "coordinator", &table(coordinator::metrics::METRICS));
-    let expected = with_part(&expected, "worker", &table(worker::metrics::METRICS));
-    if env::var_os("UPDATE_DOCS").is_some() {
-        fs::write(path, &expected).unwrap();
-    } else {
-        assert!(
-            page == expected,
-            "{PAGE} is out of date: UPDATE_DOCS=1 cargo test -p fleet-tests --test fleet \
-             monitoring::"
-        );
-    }
 }
 
 #[test]

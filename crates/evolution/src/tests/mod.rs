@@ -3,7 +3,6 @@
 mod adversity;
 mod canonical;
 mod convergence;
-mod documentation;
 mod fork;
 mod honesty;
 mod lineage;

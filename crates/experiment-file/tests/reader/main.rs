@@ -1,7 +1,6 @@
 //! The reader of experiment files, from outside.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod documentation;
 mod generated;
 mod generator;
 mod hostile;

@@ -1,22 +1,22 @@
-//! `docs/keys.md` is generated from the schema: every key of a file, by its place. After a
-//! change, write it anew: `UPDATE_DOCS=1 cargo test -p experiment-file documentation`.
+//! The schema generates `docs/keys.md`: every key of a file, by its place.
 
 mod description;
 mod parts;
 mod schema;
 mod values;
 
-use std::{collections::BTreeSet, env, fmt::Write as _, fs};
+use std::{collections::BTreeSet, fmt::Write as _, fs};
 
 use evolution::ALGORITHMS;
-use experiment_file::json_schema;
+use experiment_file::{ExperimentConfig, json_schema};
+use harness::workspace_file;
 
-use super::accept;
+use super::expect_page;
 use parts::{GROUPS, INTRODUCTION, Section};
 use schema::{Key, Schema, Variant};
 
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/keys.md");
-const GUIDE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/experiment-files.md");
+const PAGE: &str = "docs/keys.md";
+const GUIDE: &str = "docs/experiment-files.md";
 
 /// The page, and the addresses in it.
 #[derive(Default)]
@@ -163,15 +163,7 @@ fn slug(heading: &str) -> String {
 #[test]
 fn the_page_on_keys_says_what_the_schema_says() {
     let expected = Page::write(&Schema::new(json_schema(ALGORITHMS)));
-    if env::var_os("UPDATE_DOCS").is_some() {
-        fs::write(PAGE, &expected).unwrap();
-    } else {
-        let page = fs::read_to_string(PAGE).unwrap();
-        assert!(
-            page == expected,
-            "docs/keys.md is out of date: UPDATE_DOCS=1 cargo test -p experiment-file documentation"
-        );
-    }
+    expect_page(PAGE, &expected);
 }
 
 #[test]
@@ -187,8 +179,10 @@ fn the_page_on_keys_has_every_key_of_the_schema() {
 
 #[test]
 fn the_file_of_the_guide_is_right() {
-    let page = fs::read_to_string(GUIDE).unwrap();
+    let page = fs::read_to_string(workspace_file(GUIDE)).unwrap();
     let (_, rest) = page.split_once("```json\n{\n  \"world\"").expect("the page has a whole file");
     let (file, _) = rest.split_once("\n```").unwrap();
-    accept(&format!("{{\n  \"world\"{file}"));
+    let text = format!("{{\n  \"world\"{file}");
+    let (_, warnings) = ExperimentConfig::from_json(&text, "phototaxis", ALGORITHMS).unwrap();
+    assert_eq!(warnings, []);
 }
