@@ -5,12 +5,13 @@
     results/by-hand.py [--trials N] --tune NAME=VALUE,VALUE... TASK
 
 For every TASK, by default all of configs/tasks/by_hand, evaluates results/champions/TASK-*.json, and robots
-that do what configs/tasks/by_hand/TASK.star says, on trials that no evolution uses, and prints the means
-with their 95 % intervals: the fitness, and the share of the last third of an episode in which the task is
-solved, as its script defines it, or the share of trials with a fitness of FITNESS. `--record` also writes them into results/by-hand.csv, from which
-results/gallery.py makes a table. `--tune` tries every combination of values of the constants of a
-hand-written controller, on other trials, and prints the best ones. Needs swarmctl in the PATH, Python 3.9
-and nothing else.
+that do what configs/tasks/by_hand/TASK.star says, on trials that no evolution uses. Prints means with
+their 95 % intervals: the fitness, and the share of the last third of an episode in which the task is solved,
+as its script defines it. For the tasks in FITNESS, this is the share of trials with that fitness.
+
+`--record` also writes the means into results/by-hand.csv, from which results/gallery.py makes a table.
+`--tune` tries every combination of values of the constants of a hand-written controller, on other trials,
+and prints the best ones. Needs swarmctl in the PATH, Python 3.9 and nothing else.
 """
 
 import argparse

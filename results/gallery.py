@@ -10,12 +10,10 @@ the last third of the episodes, on average over all trials. Needs Python 3.9 and
 
 import csv
 import statistics
-import sys
 
-from report import RESULTS, read_csv
+from report import RESULTS, print_or_update, read_csv
 
 PAGE = RESULTS.parent / "docs" / "gallery.md"
-BEGIN, END = "<!-- generated: gallery -->\n", "<!-- end: gallery -->"
 ORDER = ["aggregation", "chain", "flocking", "synchronisation", "division_of_labour", "foraging", "dispersion", "predator"]
 ENOUGH = 0.8
 HEAD = ["task", "seeds that solve it", "share solved", "fitness", "minutes", "share solved by hand", "fitness by hand"]
@@ -53,13 +51,5 @@ def table():
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
-def main():
-    if sys.argv[1:] == ["--update"]:
-        before, rest = PAGE.read_text().split(BEGIN)
-        PAGE.write_text(before + BEGIN + "\n" + table() + "\n" + END + rest.split(END)[1])
-    else:
-        print(table(), end="")
-
-
 if __name__ == "__main__":
-    main()
+    print_or_update(PAGE, "gallery", table())

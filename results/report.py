@@ -48,6 +48,17 @@ def read_csv(path):
         return list(csv.DictReader(file))
 
 
+def print_or_update(page, name, text):
+    """Prints a table; with `--update`, writes it between the marks of its name in a page."""
+    if sys.argv[1:] != ["--update"]:
+        print(text, end="")
+        return
+    begin, end = f"<!-- generated: {name} -->\n", f"<!-- end: {name} -->"
+    before, rest = page.read_text().split(begin)
+    _, after = rest.split(end)
+    page.write_text(f"{before}{begin}\n{text}\n{end}{after}")
+
+
 def runs(folder):
     print("## Runs\n")
     rows = []

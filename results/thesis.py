@@ -11,12 +11,10 @@ runs. Readings without runs in results/ have no row. Needs Python 3.9 and nothin
 
 import json
 import statistics
-import sys
 
-from report import LAST, RESULTS, read_csv
+from report import LAST, RESULTS, print_or_update, read_csv
 
 PAGE = RESULTS.parent / "docs" / "howto" / "did-the-thesis-hold.md"
-BEGIN, END = "<!-- generated: readings -->\n", "<!-- end: readings -->"
 # Experiment, reading, algorithm, and the name of the experiment file.
 READINGS = [
     ("A", "Table 3.4", "GA", "leader_selection_ga"),
@@ -74,14 +72,5 @@ def table():
     return "\n".join(sum((row(*reading) for reading in READINGS), lines)) + "\n"
 
 
-def main():
-    if sys.argv[1:] == ["--update"]:
-        before, rest = PAGE.read_text().split(BEGIN)
-        _, after = rest.split(END)
-        PAGE.write_text(f"{before}{BEGIN}\n{table()}\n{END}{after}")
-    else:
-        print(table(), end="")
-
-
 if __name__ == "__main__":
-    main()
+    print_or_update(PAGE, "readings", table())
