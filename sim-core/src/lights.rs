@@ -34,7 +34,7 @@ enum Motion {
         radius: f64,
         sense: f64,
     },
-    /// The prey of the original simulator.
+    /// The prey of SpikeSwarmSim.
     Prey {
         direction: Vec2,
         is_caught: bool,

@@ -28,7 +28,7 @@ impl ActuatorsConfig {
     }
 }
 
-/// The original moves by `dt` times the sum of the actions, in cm; the same
+/// SpikeSwarmSim moves by `dt` times the sum of the actions, in cm; the same
 /// as a step of `dt / 5` seconds at 10 cm/s.
 const DT: Also = Also {
     key: "dt",
@@ -47,7 +47,7 @@ parameters! {
         /// Duration of an environment step dk, s.
         step_duration: f64 = positive(0.33).also(DT),
     }
-    // A dead zone of no width; the original has others, too.
+    // A dead zone of no width; SpikeSwarmSim has others, too.
     checked { Parameter::between("min_thresh", [0.0; 2], 0.0, "Accepted if it is 0") }
 
     /// LED.

@@ -69,7 +69,7 @@ pub struct PopulationConfig {
     pub params: Params,
 }
 
-/// Keys of the genetic algorithm that files of the original simulator may have
+/// Keys of the genetic algorithm that files of SpikeSwarmSim may have
 /// for any algorithm.
 pub(super) const GENETIC_KEYS: [&str; 7] = [
     "selection_operator",

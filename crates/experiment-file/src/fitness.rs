@@ -84,7 +84,7 @@ fitness_functions! {
     "identify_borderline" = IdentifyBorderline: [Need::OutputTo(ActuatorQuery::Led)],
     /// Experiment C: robots have the same heading and do not turn (Eq. 5.5).
     "orientation_consensus" = OrientationConsensus: [Need::OutputTo(ActuatorQuery::Wheels)],
-    /// Experiment C as in the original simulator. The first 100 steps do not count.
+    /// Experiment C as in SpikeSwarmSim. The first 100 steps do not count.
     "alignment" = Alignment: [
         Need::OutputTo(ActuatorQuery::Wheels),
         Need::StepsBeyond(ALIGNMENT_SETTLING_STEPS)

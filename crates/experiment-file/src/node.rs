@@ -212,8 +212,8 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The variant of `T` that a string names. `unsupported`: names that the
-    /// original simulator knows and this one does not.
+    /// The variant of `T` that a string names. `unsupported`: names that
+    /// SpikeSwarmSim knows and this one does not.
     pub(crate) fn variant<T: Deserialize<'a>>(self, unsupported: &[&str]) -> Option<T> {
         let (report, path) = (self.report, self.path.clone());
         let name = self.string()?;
@@ -419,7 +419,7 @@ impl<'a> Object<'a> {
         })
     }
 
-    /// Refuses keys by name that the original simulator knows.
+    /// Refuses keys by name that SpikeSwarmSim knows.
     pub(crate) fn unsupported(&mut self, keys: &[&str]) {
         for key in keys {
             if self.properties.swap_remove(*key).is_some() {

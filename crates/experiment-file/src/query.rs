@@ -152,7 +152,7 @@ impl fmt::Display for GenotypeQuery {
 /// Why a text is not a query.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ParseQueryError {
-    /// The text names a part of the original simulator that this one lacks.
+    /// The text names a part of SpikeSwarmSim that this one lacks.
     #[error("not supported: `{0}`")]
     Unsupported(String),
     /// The text has another form.

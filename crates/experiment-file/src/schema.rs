@@ -1,7 +1,7 @@
 //! The JSON Schema of experiment files, for editors and other programs.
 //!
 //! It is derived from the types, which describe the canonical form. Attributes on them add the
-//! further forms of a file (omitted keys, other notations, keys of the original simulator), with
+//! further forms of a file (omitted keys, other notations, keys of SpikeSwarmSim), with
 //! the functions defined here.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
@@ -97,7 +97,7 @@ pub(super) fn or_name_or_null(schema: &mut Schema) {
     }
 }
 
-/// Ground areas by the names that they have in the original simulator, with their colours.
+/// Ground areas by the names that they have in SpikeSwarmSim, with their colours.
 pub(super) fn food_areas_and_nests(schema: &mut Schema) {
     let Some(Value::Array(variants)) = schema.get_mut("oneOf") else { return };
     let is_area =
@@ -177,7 +177,7 @@ pub(super) fn place_of_schema() -> Value {
     json!({"type": "string", "description": "Path of the JSON Schema, for editors."})
 }
 
-/// The schema of a key of the original simulator that may name the experiment.
+/// The schema of a key of SpikeSwarmSim that may name the experiment.
 pub(super) fn checkpoint_file() -> Value {
     json!({
         "type": ["string", "null"],

@@ -1,4 +1,4 @@
-//! `semantics`: chooses the defaults of omitted keys. The original simulator's defaults are those
+//! `semantics`: chooses the defaults of omitted keys. SpikeSwarmSim's defaults are those
 //! that tables of parameters call `original`. Every such key can be given alone, too;
 //! `docs/fidelity.md` explains each.
 

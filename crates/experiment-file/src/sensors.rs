@@ -12,7 +12,7 @@ use crate::DefaultValue::{Name, Number, Required, Whole};
 use crate::parameters::{Also, parameters, variants};
 use crate::{Domain, limits};
 
-/// Sensors of the original simulator that this one lacks.
+/// Sensors of SpikeSwarmSim that this one lacks.
 pub(crate) const UNSUPPORTED: [&str; 1] = ["neighbors_state_sensor"];
 
 /// Readings that are refused by name.
@@ -187,7 +187,7 @@ sensors! { $
 /// Range of the number of sectors, and of other numbers of values.
 const SECTORS: [u32; 2] = [1, limits::SECTORS];
 
-/// The original states the standard deviation of noise.
+/// SpikeSwarmSim states the standard deviation of noise.
 const NOISE_SIGMA: Also = Also {
     key: "noise_sigma",
     max: 31_622.776_601_683_792,

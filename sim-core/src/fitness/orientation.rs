@@ -61,7 +61,7 @@ fn misalignment(headings: &[f64]) -> f64 {
     mean(headings.iter().map(|&heading| angular_difference(heading, center)))
 }
 
-/// `alignment`, as in the original simulator: with E the largest difference of two
+/// `alignment`, as in SpikeSwarmSim: with E the largest difference of two
 /// headings, clip(1 - E / (0.4 pi), 0, 1) * mean clip(1 - |right wheel|, 0, 1).
 #[derive(Debug)]
 pub(super) struct Alignment;

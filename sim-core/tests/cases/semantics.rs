@@ -1,4 +1,4 @@
-//! Keys whose defaults differ between thesis and original simulator: each alone, and all
+//! Keys whose defaults differ between thesis and SpikeSwarmSim: each alone, and all
 //! together.
 
 use experiment_file::{

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use super::description::{Description, sentence};
 use super::parts::Section;
 
-/// What the schema says of keys that concern the original simulator alone.
+/// What the schema says of keys that concern SpikeSwarmSim alone.
 const IGNORED: &str = "Accepted and ignored.";
 /// Keys of a population that do not depend on the algorithm.
 const OF_POPULATION: [&str; 4] = ["objects", "min_vals", "max_vals", "params"];

@@ -1,4 +1,4 @@
-//! Exponential integrate and fire (Fourcaud-Trocme et al. 2003), as the original has it:
+//! Exponential integrate and fire (Fourcaud-Trocme et al. 2003), as SpikeSwarmSim has it:
 //! tau dv/dt = v_rest - v + 0.3 exp(v - thresh) + 0.6 I, a spike at 30 mV.
 
 use super::{NeuronModelSpec, NeuronParameter, VOLTAGE};

@@ -42,7 +42,7 @@ pub struct Kind {
 pub(crate) struct Choice<'a> {
     /// Their names.
     pub names: Vec<&'static str>,
-    /// Names of the original simulator that are refused as not supported.
+    /// Names of SpikeSwarmSim that are refused as not supported.
     pub unsupported: &'a [&'a str],
     /// The one of a file that names none; none: it has to.
     pub default: Option<&'static str>,

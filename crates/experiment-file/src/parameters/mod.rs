@@ -70,7 +70,7 @@ pub enum Domain {
     OneOf {
         /// The names that are accepted.
         names: &'static [&'static str],
-        /// Names of the original simulator that are refused as not supported.
+        /// Names of SpikeSwarmSim that are refused as not supported.
         unsupported: &'static [&'static str],
     },
     /// The name of a variant of a type.
@@ -124,7 +124,7 @@ pub enum DefaultValue {
     Required,
 }
 
-/// The default of the original simulator.
+/// The default of SpikeSwarmSim.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Original {
     /// This value.
@@ -203,7 +203,7 @@ constructors! {
     pub below_population_size(default: u32) =
         Domain::BelowPopulationSize, DefaultValue::Whole(default);
     /// One of `names`, the first of which is the default; `unsupported` are names
-    /// of the original simulator that are refused as such.
+    /// of SpikeSwarmSim that are refused as such.
     pub one_of(names: &'static [&'static str], unsupported: &'static [&'static str]) =
         Domain::OneOf { names, unsupported }, DefaultValue::Name(names[0]);
     /// A name, for instance of a colour.
@@ -232,10 +232,10 @@ macro_rules! setters {
 setters! {
     /// The same with a unit.
     measured(unit: &'static str) = unit: unit;
-    /// The same with another default where the semantics are the original's.
+    /// The same with another default where the semantics are SpikeSwarmSim's.
     original(default: DefaultValue) = original: Some(Original::Value(default));
     /// The same with a default that follows from the parameters before, where the semantics are
-    /// the original's.
+    /// SpikeSwarmSim's.
     original_from(default: fn(&Params) -> f64) = original: Some(Original::From(default));
     /// The same with these words for the default.
     shown(text: &'static str) = default_text: text;

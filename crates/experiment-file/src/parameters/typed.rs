@@ -209,7 +209,7 @@ macro_rules! key {
 }
 
 /// Makes variants of a type, whose names `serde` knows, values of parameters. `unsupported` are
-/// names of the original simulator that are refused as such.
+/// names of SpikeSwarmSim that are refused as such.
 macro_rules! variants {
     ($($name:ident, unsupported: $unsupported:expr;)*) => {$(
         impl $name {

@@ -73,7 +73,7 @@ fn params_of(o: &mut Places<'_, '_>, algorithm: &'static AlgorithmDescription) -
     if let Some(encoding) = o.optional("encoding") {
         encoding.one_of(&["real"], &[]);
     }
-    // The original simulator fills these in for every algorithm.
+    // SpikeSwarmSim fills these in for every algorithm.
     for key in GENETIC_KEYS.into_iter().filter(|key| !algorithm.has(key)) {
         o.ignored(key, "only the genetic algorithm has it");
     }

@@ -17,8 +17,8 @@ pub(crate) fn check_name(name: &str) -> Result<(), String> {
     }
 }
 
-/// The message for a name that is not among `expected`. `unsupported`: names that only the
-/// original simulator knows.
+/// The message for a name that is not among `expected`. `unsupported`: names that only
+/// SpikeSwarmSim knows.
 pub(crate) fn unknown_name(name: &str, expected: &[&str], unsupported: &[&str]) -> String {
     if unsupported.contains(&name) {
         format!("not supported: `{name}`; {}", known_names(expected))

@@ -1,4 +1,4 @@
-//! The meaning of files of the original simulator: its defaults, its constants, and keys that
+//! The meaning of files of SpikeSwarmSim: its defaults, its constants, and keys that
 //! concern only it.
 
 use std::f64::consts::PI;
@@ -12,7 +12,7 @@ use experiment_file::{
     SendingDirection, WirelessReceiverConfig, json_schema,
 };
 
-/// The base experiment with the defaults of the original simulator, and edits of it.
+/// The base experiment with the defaults of SpikeSwarmSim, and edits of it.
 fn original(edits: &[(&str, &str)]) -> ExperimentConfig {
     let name = r#""name": "base","#;
     let text = edited(name, r#""name": "base", "semantics": "original","#);

@@ -107,7 +107,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""LIGHT": {"n": 6"#, r#""H": {"n": 6"#,
      "line 11: topology.ensembles.H: a stimulus has the same name\n\
       line 24: topology.synapses.in.pre[1]: no ensemble or stimulus is named `LIGHT`; known: `H`, `OUT_MSG`, `OUT_LED`, `OUT_MODE`, `OUT_WHEELS`, `MSG`, `H`"),
-    // Features that only the original simulator has.
+    // Features that only SpikeSwarmSim has.
     (r#""neuron_model": "rate_model""#, r#""neuron_model": "rate_model", "synapse_model": "dynamic_synapse""#,
      "line 9: topology.synapse_model: dynamic synapses need neurons that spike"),
     (r#"{"scheme": "IdentityEncoding"}"#, r#"{"scheme": "PoissonRateCoding"}"#,

@@ -1,4 +1,4 @@
-//! Files of the original simulator, accepted unchanged. They are not part of the project: if they
+//! Files of SpikeSwarmSim, accepted unchanged. They are not part of the project: if they
 //! are absent, these tests say so and pass. Files of our own with all their keys are tested
 //! everywhere.
 
@@ -13,7 +13,7 @@ use experiment_file::{ExperimentConfig, FitnessFunction};
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference");
 const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs");
 
-/// The text of a file of the original simulator, if it is there.
+/// The text of a file of SpikeSwarmSim, if it is there.
 fn text(file: &str) -> Option<String> {
     let folder = env::var("SWARM_REFERENCE").unwrap_or_else(|_| FOLDER.to_owned());
     let path = format!("{folder}/{file}");
@@ -35,7 +35,7 @@ fn reference(file: &str) -> Option<(ExperimentConfig, Vec<String>)> {
     text(file).map(|text| accepted(&text))
 }
 
-/// A shipped file rewritten with the keys of the original simulator.
+/// A shipped file rewritten with the keys of SpikeSwarmSim.
 fn in_the_manner_of_the_original(file: &str) -> Value {
     let text = fs::read_to_string(format!("{SHIPPED}/{file}")).unwrap();
     let mut file: Value = serde_json::from_str(&text).unwrap();

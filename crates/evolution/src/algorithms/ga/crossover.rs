@@ -50,7 +50,7 @@ impl Crossover {
     /// The configured operator.
     pub fn new(params: &Params) -> Self {
         match params.of::<String>(&OPERATOR).as_str() {
-            // The original simulator has two names for this operator.
+            // SpikeSwarmSim has two names for this operator.
             "blxalpha" | "combination" => Self::BlxAlpha { alpha: params.of(&ALPHA) },
             "uniform" => Self::Uniform,
             "onepoint" => Self::OnePoint,

@@ -58,7 +58,7 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
 
 /// Experiment A's network, and variants with every kind of block: one ensemble of `tanh`, odd
 /// numbers of neurons, two groups of synapses between the same neurons, more pairs of neurons
-/// than a vector has lanes; and neurons as in the original simulator.
+/// than a vector has lanes; and neurons as in SpikeSwarmSim.
 fn networks() -> [(Network, Phenotype); 5] {
     let mut tanh = experiment_a();
     tanh.topology.ensembles["H2"].activation = Some(Activation::Tanh);
