@@ -19,7 +19,7 @@ from mkdocs.structure.files import File
 ROOT = Path(__file__).resolve().parents[2]
 HELP = "client/src/commands/snapshots/swarmctl__commands__tests__the_manual.snap"
 PROTOCOL = "proto/swarm/v1"
-PAGES = {"README.md": "start.md", "CHANGELOG.md": "CHANGELOG.md", "CONTRIBUTING.md": "CONTRIBUTING.md"}
+PAGES = {"README.md": "start.md", "CONTRIBUTING.md": "CONTRIBUTING.md"}
 PYTHON = ["python/swarmevo/__init__.py", "python/swarmevo/analysis/__init__.py"]
 FAULTS = "tests/fleet/faults"
 # Where else faults are caused.

@@ -41,7 +41,6 @@ fn every_page_that_a_source_names_exists() {
         "python",
         "sim-core",
         "tests",
-        "web",
         "worker",
     ]
     .iter()

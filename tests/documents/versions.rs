@@ -34,7 +34,7 @@ fn every_file_that_names_the_version_of_the_project_names_the_same() {
     for (path, before, after) in [
         ("python/Cargo.toml", "\nversion = \"", "\""),
         ("CITATION.cff", "\nversion: ", "\n"),
-        ("CHANGELOG.md", "\n## [", "]"),
+        ("docs/changelog.md", "\n## [", "]"),
         ("docs/deploy.md", "-t swarmevo/worker:", " "),
         ("docs/deploy/kubernetes/coordinator.yaml", "image: swarmevo/coordinator:", "\n"),
         ("docs/deploy/kubernetes/worker.yaml", "image: swarmevo/worker:", "\n"),

@@ -1,6 +1,6 @@
 """Pages in a real browser: headless Chromium, driven by selenium.
 
-    python web/tests/browser.py target/debug
+    python crates/web/tests/browser.py target/debug
 
 The argument is the folder with coordinator, worker and swarmctl; `harness.py` describes its other
 options. Without Chromium and its driver the tests are skipped, with a line that says so.

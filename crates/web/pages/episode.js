@@ -1,4 +1,4 @@
-// A packed episode; web/src/replay/mod.rs describes the format.
+// A packed episode; crates/web/src/replay/mod.rs describes the format.
 
 const ARRAYS = { i8: Int8Array, i16: Int16Array, i32: Int32Array, f32: Float32Array };
 

@@ -29,7 +29,7 @@ fn running() -> Experiment {
 /// Pages of a data directory with one experiment, which has no generation yet.
 fn site(token: Option<&str>) -> (TempDir, Site) {
     let directory = tempfile::tempdir().unwrap();
-    let config_json = include_str!("../../../configs/quickstart.json").to_owned();
+    let config_json = include_str!("../../../../configs/quickstart.json").to_owned();
     let mut new = Submission { config_json, ..Submission::default() }.check(&|| true).unwrap().new;
     new.config.name = "first".to_owned();
     Store::open(directory.path()).unwrap().create(&new, 0).unwrap();

@@ -1,7 +1,7 @@
 """Measures the speed of pages in headless Chromium: first paint, zooming the map. Replays:
 `frames.py`.
 
-    target/python/bin/python web/tests/speed.py target/release
+    target/python/bin/python crates/web/tests/speed.py target/release
 
 The argument is the folder with coordinator, worker and swarmctl. Without a graphics card, the
 processor draws everything.

@@ -1,6 +1,6 @@
 """Measures frames per second of a replay in headless Chromium, and the use of the time.
 
-    target/python/bin/python web/tests/frames.py target/debug [--profile]
+    target/python/bin/python crates/web/tests/frames.py target/debug [--profile]
 
 The argument is the folder with swarmctl. Trails and who hears whom, and then the reach of all
 radios, too, are shown while 50 and 500 robots play. With --profile it also prints the

@@ -17,7 +17,7 @@ import threading
 import unittest
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1) if len(sys.argv) > 1 else "target/debug").resolve()
-CONFIG = pathlib.Path(__file__).parents[2] / "configs/quickstart.json"
+CONFIG = pathlib.Path(__file__).parents[3] / "configs/quickstart.json"
 CLIENT_TOKEN = "client-token-0123456789abcdef0123"
 WORKER_TOKEN = "worker-token-0123456789abcdef0123"
 CHROMIUM = shutil.which("chromium")

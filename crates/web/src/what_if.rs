@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     fn quickstart() -> ExperimentConfig {
-        let text = include_str!("../../configs/quickstart.json");
+        let text = include_str!("../../../configs/quickstart.json");
         ExperimentConfig::from_json(text, "", ALGORITHMS).unwrap().0
     }
 

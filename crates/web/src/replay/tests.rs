@@ -12,7 +12,7 @@ use super::*;
 /// The quickstart, cut to 40 steps.
 fn quickstart() -> ExperimentConfig {
     let text =
-        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json"));
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/quickstart.json"));
     let text = text.unwrap().replace("\"evaluation_steps\": 100", "\"evaluation_steps\": 40");
     ExperimentConfig::from_json(&text, "", evolution::ALGORITHMS).unwrap().0
 }

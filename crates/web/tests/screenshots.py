@@ -1,6 +1,6 @@
 """The pictures of docs/web.md and docs/gallery.md: present pages and replays, in docs/figures.
 
-    target/python/bin/python web/tests/screenshots.py target/debug
+    target/python/bin/python crates/web/tests/screenshots.py target/debug
 
 Called like `browser.py`. It is not a test: it replaces the files.
 """
