@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the numbers of docs/reproduction.md, as tables.
+"""Prints the numbers of docs/notebook/2026-11-claims.md, as tables.
 
     results/report.py [DIRECTORY]    runs and evaluations in it; results/ by default
 

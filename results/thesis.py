@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints what each reading of the thesis comes to: its tables, and the constants of SpikeSwarmSim.
 
-    results/thesis.py              the table of docs/howto/did-the-thesis-hold.md
+    results/thesis.py              the table of docs/reproduction.md
     results/thesis.py --update     writes it into that page
 
 The mean fitness is that of the last 50 generations, a median over the runs, in brackets the least and
@@ -14,7 +14,7 @@ import statistics
 
 from report import LAST, RESULTS, print_or_update, read_csv
 
-PAGE = RESULTS.parent / "docs" / "howto" / "did-the-thesis-hold.md"
+PAGE = RESULTS.parent / "docs" / "reproduction.md"
 # Experiment, reading, algorithm, and the name of the experiment file.
 READINGS = [
     ("A", "Table 3.4", "GA", "leader_selection_ga"),

@@ -33,8 +33,8 @@ def test_every_figure_is_drawn(name, number):
 
 
 def test_every_figure_of_the_registry_is_in_the_documents_with_its_number():
-    text = (PROJECT / "docs/reproduction.md").read_text(encoding="utf-8")
-    embedded = dict(re.findall(r"!\[Fig\. ([\d.]+): [^\]]+\]\(figures/(thesis-[^)]+)\)", text))
+    text = (PROJECT / "docs/notebook/2026-11-claims.md").read_text(encoding="utf-8")
+    embedded = dict(re.findall(r"!\[Fig\. ([\d.]+): [^\]]+\]\(\.\./figures/(thesis-[^)]+)\)", text))
     numbers = [number for figures in ALL.values() for number in figures]
     assert embedded == {number: file_name(number) for number in numbers}
     for name in embedded.values():

@@ -260,7 +260,7 @@ fn every_file_that_is_listed_is_here_with_its_digest_or_can_be_fetched() {
     assert_eq!(fs::read_to_string(damaged).unwrap(), "other");
 }
 
-/// Compares numbers of `docs/reproduction.md`, one of each table.
+/// Compares numbers of `docs/notebook/2026-11-claims.md`, one of each table.
 #[test]
 fn the_script_of_the_report_prints_its_numbers() {
     let Some(project) = project_with_all_runs() else { return };
@@ -313,7 +313,7 @@ fn project_with(script: &str) -> TempDir {
 fn pages_have_the_tables_that_scripts_make_of_the_runs() {
     let Some(project) = project_with_all_runs() else { return };
     for (name, page) in
-        [("compare.py", "docs/reproduction.md"), ("thesis.py", "docs/howto/did-the-thesis-hold.md")]
+        [("compare.py", "docs/notebook/2026-11-claims.md"), ("thesis.py", "docs/reproduction.md")]
     {
         let mut command = script(project.path().join("results").join(name));
         let table = Outcome::of_command(&mut command).expect_success().stdout;
