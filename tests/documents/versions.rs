@@ -25,7 +25,7 @@ fn every_file_that_names_a_version_of_rust_names_the_same() {
     assert_eq!(between("docker/Dockerfile", "BUILD_IMAGE=", "\n"), image);
     assert_eq!(between("docker/compose.yaml", "${BUILD_IMAGE:-", "}"), image);
     assert_eq!(between("docker/test.sh", "BUILD_IMAGE=", " "), image);
-    assert_eq!(between("docs/docker.md", "`BUILD_IMAGE`, `RUNTIME_IMAGE` | `", "`"), image);
+    assert_eq!(between("docs/deploy.md", "`BUILD_IMAGE`, `RUNTIME_IMAGE` | `", "`"), image);
 }
 
 #[test]

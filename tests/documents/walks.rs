@@ -258,11 +258,9 @@ fn pages_show_what_their_commands_print() {
     assert_true(&[
         "README.md",
         "docs/evaluation.md",
-        "docs/howto/check-a-result.md",
         "docs/howto/compare.md",
-        "docs/howto/is-it-any-good.md",
         "docs/howto/publish.md",
-        "docs/howto/recover.md",
+        "docs/data.md",
         "docs/howto/write-a-sensor.md",
     ]);
 }

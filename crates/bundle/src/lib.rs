@@ -3,7 +3,7 @@
 //!
 //! A bundle is a ZIP archive and an [RO-Crate]. [`Bundle::read`] reads one without trusting it.
 //! [`Verification`] repeats the experiment's evolution and returns a [`Proof`]. It hands out
-//! [batches](Batch), whose simulation also proves the fitness. `docs/history.md` has the format.
+//! [batches](Batch), whose simulation also proves the fitness. `docs/howto/publish.md` has the format.
 //!
 //! [RO-Crate]: https://w3id.org/ro/crate/1.3
 

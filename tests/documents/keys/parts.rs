@@ -78,9 +78,8 @@ pub const GROUPS: &[Group] = &[
     },
     Group {
         title: "Evolution",
-        text: "[Which algorithm?](howto/which-algorithm.md) helps to choose; \
-               [Algorithms](algorithms.md) has the formulas. d is the number of genes of a \
-               population.",
+        text: "[Algorithms](algorithms.md) helps to choose, and has the formulas. d is the number of \
+               genes of a population.",
         sections: EVOLUTION,
     },
     Group {
