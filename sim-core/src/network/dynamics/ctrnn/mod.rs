@@ -10,7 +10,7 @@
 //! y(t+dt) = (1 - r) * y + r * k * g * (W_N u + W_I phi + beta), u = F(y),
 //!
 //! with beta / g in place of beta where the gain does not multiply the bias, and with one multiply-add per synapse and one per neuron; W_I phi is constant
-//! within an environment step. It is computed in f32, which `docs/performance.md`
+//! within an environment step. It is computed in f32, which `docs/notebook/2026-11-simulation.md`
 //! justifies; all constants are computed in f64 and rounded once.
 //!
 //! All lanes share the weights, and never interact. [`chunk`] computes whole vectors of lanes, in
