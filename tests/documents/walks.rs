@@ -261,7 +261,7 @@ fn pages_show_what_their_commands_print() {
         "docs/howto/compare.md",
         "docs/howto/publish.md",
         "docs/data.md",
-        "docs/howto/write-a-sensor.md",
+        "docs/tasks.md",
     ]);
 }
 

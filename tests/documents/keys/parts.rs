@@ -65,7 +65,7 @@ pub const GROUPS: &[Group] = &[
     Group { title: "World and objects", text: "", sections: WORLD },
     Group {
         title: "What robots perceive",
-        text: "[Write a sensor](howto/write-a-sensor.md) shows how to make one of your own.",
+        text: "[Write a sensor](tasks.md#write-a-sensor) shows how to make one of your own.",
         sections: SENSORS,
     },
     Group { title: "What robots do", text: "", sections: ACTUATORS },
