@@ -31,7 +31,7 @@ pub(crate) enum Genotype {
 }
 
 impl Genotype {
-    /// The genes, or why the worker cannot draw them.
+    /// The genes, or the reason why the worker cannot draw them.
     pub(crate) fn genes(&self) -> Result<Cow<'_, [f64]>, String> {
         match self {
             Self::Sent(genes) => Ok(Cow::Borrowed(genes)),

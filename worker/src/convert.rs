@@ -22,9 +22,8 @@ pub(crate) const RESULTS_PER_MESSAGE_MAX: usize = 256;
 /// Most numbers in one message of several results: 4 MiB.
 const VALUES_PER_MESSAGE_MAX: usize = 1 << 19;
 
-/// Makes a specification computable. The slot that computes its first assignment compiles it,
-/// once; a specification that does not compile fails each of its assignments. `stats`: counts
-/// robots' steps.
+/// Makes a specification computable. The slot with its first assignment compiles it, once. If it
+/// does not compile, each of its assignments fails. `stats`: counts robots' steps.
 pub(crate) fn evaluator(config_json: String, isa: Isa, stats: Arc<Stats>) -> Evaluator {
     let compiled = OnceLock::new();
     Arc::new(move |assignment: &Assignment, keep_going: &dyn Fn() -> bool| {
@@ -63,8 +62,8 @@ pub(crate) fn common(assignments: &v1::Assignments) -> Result<Common, String> {
     Ok(Common { job, trial_set, output })
 }
 
-/// Reads an assignment, or fails it, because the coordinator's messages may be wrong.
-/// `distribution`: the latest of the job.
+/// Reads an assignment, or returns its failure if it is invalid. `distribution`: the latest of the
+/// job.
 pub(crate) fn assignment(
     common: &Common,
     distribution: Option<&Arc<Distribution>>,
@@ -82,7 +81,12 @@ pub(crate) fn assignment(
         (Some(individual), Some(of)) if trial_set == TrialSet::Generation(of.generation()) => {
             Genotype::Drawn(Arc::clone(of), individual)
         }
-        (Some(_), _) => return Err(failure(id, format!("no distribution of {trial_set} came"))),
+        (Some(_), _) => {
+            return Err(failure(
+                id,
+                format!("the coordinator sent no distribution of {trial_set}"),
+            ));
+        }
     };
     Ok(Assignment { id, job, trial_set, output, trials: first_trial..end, genotype })
 }

@@ -29,7 +29,7 @@ impl Evaluators {
 
     /// The evaluator of a specification; equal specifications are compiled once.
     pub(crate) fn get(&self, config_json: &str) -> Evaluator {
-        let mut latest = self.latest.lock().expect("nothing panics while it holds them");
+        let mut latest = self.latest.lock().expect("nothing panics while it holds the lock");
         let new = || convert::evaluator(config_json.to_owned(), self.isa, Arc::clone(&self.stats));
         Arc::clone(latest.get_or_insert_ref(config_json, new))
     }
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_specifications_share_what_computes_them() {
+    fn equal_specifications_share_an_evaluator() {
         let evaluators = Evaluators::new(Isa::best(), Arc::default());
         let first = evaluators.get("{}");
         assert!(Arc::ptr_eq(&first, &evaluators.get("{}")));

@@ -44,14 +44,13 @@ pub struct WorkerConfig {
     /// Number of items computed at the same time, each on a thread of its own,
     /// 1 to [`SLOTS_MAX`].
     pub slots: usize,
-    /// Pattern for the names of the experiments whose items it takes, up to
-    /// [`WORKER_NAME_LEN_MAX`] bytes: `*` stands for any text and `?` for one character. Empty:
-    /// all.
+    /// Pattern, up to [`WORKER_NAME_LEN_MAX`] bytes: the worker takes items of experiments with a
+    /// matching name. `*` stands for any text and `?` for one character. Empty: all.
     pub experiments: String,
-    /// Upper bound of the random delay before the first reconnection; it doubles
-    /// with every further one that fails.
+    /// Upper bound of the random delay before the first reconnection. The bound doubles with every
+    /// failed attempt.
     pub retry_delay_min: Duration,
-    /// Largest upper bound of that delay.
+    /// Largest value of this bound.
     pub retry_delay_max: Duration,
     /// The token and certificates for the coordinator.
     pub credentials: Credentials,
@@ -61,8 +60,8 @@ pub struct WorkerConfig {
     pub stats: Arc<Stats>,
     /// File that shows [`health_check`] whether the worker has a session with the coordinator.
     pub session_file: Option<PathBuf>,
-    /// Ends items of scripts that are still in progress after `shutdown`, because they may take
-    /// any time; other workers recompute them.
+    /// After `shutdown`, ends items of scripts that are still in progress, because they may take
+    /// any time. Other workers recompute them.
     pub give_up: CancellationToken,
 }
 
@@ -89,8 +88,8 @@ impl WorkerConfig {
 /// Time for which a worker continues items of scripts after a signal to stop.
 pub const FINISHING_TIME: Duration = Duration::from_millis(700);
 
-/// Why a worker gave up. It retries after passing problems (a coordinator that is down, a broken
-/// connection), which never become this error.
+/// Why a worker gave up. Temporary problems, such as a coordinator that is down or a broken
+/// connection, never become this error: the worker tries again.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkerError {
     /// The coordinator's address is invalid, or the credentials do not fit it. Fix the input.
@@ -279,7 +278,7 @@ async fn run_with(
     }
 }
 
-/// Whether it is the answer of a gateway in front of a coordinator that does not run.
+/// Whether the answer comes from a gateway whose coordinator does not run.
 fn is_of_gateway(banner: &str) -> bool {
     let status = banner.strip_prefix("HTTP/").and_then(|rest| rest.split(' ').nth(1));
     matches!(status, Some("502" | "503" | "504"))
@@ -327,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_protocol_cannot_carry_is_an_input_error() {
+    fn values_that_the_protocol_cannot_carry_are_input_errors() {
         let url = "http://127.0.0.1:7700";
         for error in [
             rejection("", "w", 1),

@@ -16,7 +16,7 @@ const N_LONGEST: u32 = 2;
 pub struct Lifetime {
     /// Time without an item after which the worker ends.
     pub idle_timeout: Option<Duration>,
-    /// Time since its start by which the worker has ended.
+    /// The worker ends within this time after its start.
     pub time_limit: Option<Duration>,
 }
 
@@ -70,7 +70,7 @@ impl Watchdog {
         }
         if let Some(limit) = self.lifetime.time_limit {
             let age = now - self.started;
-            // In a short life, the farewell takes only a part.
+            // If the limit is short, half of it stays for work.
             let needed = (N_LONGEST * stats.longest_item + MARGIN).min(limit / 2);
             if age >= limit {
                 return Some(Expired::TimeIsUp);
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn idle_is_who_has_had_no_item_for_as_long_without_a_break() {
+    fn a_worker_that_gets_no_item_for_the_whole_timeout_is_idle() {
         let (mut dog, start) = watchdog(Some(10), None);
         let none = StatsSnapshot::default();
         assert_eq!(dog.look(start + 9 * SECOND, &busy(1, SECOND)), None);
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn items_that_take_long_are_given_time_to_finish() {
+    fn long_items_get_time_to_finish() {
         let (mut dog, start) = watchdog(None, Some(3600));
         let long = busy(8, 300 * SECOND);
         assert_eq!(dog.look(start + 2994 * SECOND, &long), None);
@@ -125,11 +125,11 @@ mod tests {
         assert_eq!(dog.look(start + 3594 * SECOND, &busy(8, Duration::ZERO)), None);
         assert_eq!(dog.look(start + 3600 * SECOND, &long), Some(Expired::TimeIsUp));
         let (mut dog, start) = watchdog(None, Some(4));
-        assert_eq!(dog.look(start + SECOND, &long), None, "a short life is not all farewell");
+        assert_eq!(dog.look(start + SECOND, &long), None, "half of a short limit stays for work");
     }
 
     #[test]
-    fn whoever_has_no_bounds_lives_on() {
+    fn a_worker_without_bounds_never_ends_by_itself() {
         let (mut dog, start) = watchdog(None, None);
         assert_eq!(dog.look(start + 1_000_000 * SECOND, &StatsSnapshot::default()), None);
         assert!(!Lifetime::default().is_bounded());

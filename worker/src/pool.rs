@@ -22,8 +22,8 @@ use crate::{
     stats::{Made, Stats},
 };
 
-/// Computes the numbers of an assignment, or says why it cannot. It regularly calls its argument
-/// to learn whether to continue, and returns `None` if not.
+/// Computes the numbers of an assignment, or says why it cannot. It regularly calls its second
+/// argument to learn whether to continue, and returns `None` if not.
 pub(crate) type Evaluator =
     Arc<dyn Fn(&Assignment, &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, String> + Send + Sync>;
 
@@ -204,8 +204,8 @@ impl Shared {
     }
 }
 
-/// Computes one assignment; without a result if it is cancelled meanwhile. A panic fails the
-/// assignment, not the worker.
+/// Computes one assignment; `None` if it is cancelled meanwhile. A panic fails the assignment, not
+/// the worker.
 #[expect(
     clippy::disallowed_methods,
     reason = "reports how long an assignment took; decides nothing"
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn dropping_what_is_queued_lets_what_is_running_finish() {
+    fn dropping_the_queue_lets_items_in_progress_finish() {
         let pool = Pool::start(1, Arc::default()).unwrap();
         let (reply, results) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn cancelling_stops_what_is_running_and_drops_what_waits() {
+    fn cancelling_stops_running_items_and_drops_waiting_ones() {
         let pool = Pool::start(1, Arc::default()).unwrap();
         let (reply, results) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn what_becomes_of_items_is_counted() {
+    fn outcomes_of_items_are_counted() {
         let stats = Arc::new(Stats::default());
         let pool = Pool::start(1, Arc::clone(&stats)).unwrap();
         let (reply, results) = mpsc::channel(4);
@@ -377,7 +377,7 @@ mod tests {
         let snapshot = stats.snapshot();
         assert_eq!(snapshot.n_items_computed, 1);
         assert_eq!(snapshot.n_items_failed, 1);
-        assert_eq!(snapshot.n_items_dropped, 1, "of two, one had not begun");
+        assert_eq!(snapshot.n_items_dropped, 1, "one of the two had not begun");
         assert_eq!(snapshot.n_episodes, 1);
         assert_eq!((snapshot.n_slots_busy, snapshot.n_items_queued), (0, 0));
         assert!(snapshot.busy > Duration::ZERO);
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dropped_pool_finishes_what_is_running_and_nothing_else() {
+    fn a_dropped_pool_finishes_only_items_in_progress() {
         let pool = Pool::start(1, Arc::default()).unwrap();
         let (reply, results) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();

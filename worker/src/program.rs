@@ -82,8 +82,8 @@ struct Args {
     /// End after this time without an item: 90s, 15m, 2h [default: wait without limit]
     #[arg(long, value_name = "TIME", value_parser = parse_positive_duration)]
     idle_timeout: Option<Duration>,
-    /// Time after which this worker has ended, such as the time limit of a batch job: it
-    /// takes no more items and finishes those that it has early enough [default: no limit]
+    /// Time within which this worker ends, such as the time limit of a batch job: it stops taking
+    /// items early enough to finish those that it has [default: no limit]
     #[arg(long, value_name = "TIME", value_parser = parse_positive_duration)]
     time_limit: Option<Duration>,
     #[command(flatten)]
@@ -202,7 +202,7 @@ async fn watch_over(lifetime: Lifetime, stats: Arc<Stats>, shutdown: Cancellatio
             Some(Expired::Idle) => "idle for the time of --idle-timeout",
             Some(Expired::TimeIsNear) => "near the end of --time-limit",
             Some(Expired::TimeIsUp) => {
-                warn!("the time of --time-limit is over before all items are done: others do them");
+                warn!("--time-limit is over before all items are done: other workers compute them");
                 std::process::exit(0);
             }
         };
@@ -217,7 +217,7 @@ async fn watch_over(lifetime: Lifetime, stats: Arc<Stats>, shutdown: Cancellatio
 fn report_health(session_file: &Path) -> ExitCode {
     match health_check(session_file) {
         Ok(session) => {
-            // The exit code also says it, for callers that do not read the line.
+            // If nobody reads the line, the exit code still tells the result.
             let _ = writeln!(io::stdout(), "healthy: {session}");
             ExitCode::SUCCESS
         }
@@ -228,8 +228,8 @@ fn report_health(session_file: &Path) -> ExitCode {
     }
 }
 
-/// The first signal tells the worker to finish, items of scripts within [`FINISHING_TIME`]; the
-/// second ends the process.
+/// The first signal tells the worker to finish its items; those of scripts get [`FINISHING_TIME`].
+/// The second signal ends the process.
 fn stop_on_signals(shutdown: CancellationToken, give_up: CancellationToken) -> io::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;

@@ -54,9 +54,9 @@ pub(crate) struct Session {
 /// Why a session could not be opened.
 #[derive(Debug)]
 pub(crate) enum OpenError {
-    /// The versions differ, so it never will be; with the coordinator's reason.
+    /// The versions differ, so another attempt is useless. Has the coordinator's reason.
     VersionMismatch(String),
-    /// The coordinator does not accept the credentials; with the coordinator's reason.
+    /// The coordinator does not accept the credentials. Has the coordinator's reason.
     Denied(String),
     /// The coordinator refused for now.
     Refused(String),
@@ -72,7 +72,7 @@ pub(crate) enum Ended {
     /// The stream broke.
     Lost {
         reason: String,
-        /// Whether the session was of any use before.
+        /// Whether the session had lasted for a heartbeat, or had received a message.
         worked: bool,
     },
 }
@@ -109,7 +109,7 @@ impl Session {
             Some(WorkResponse { message: Some(Message::Welcome(welcome)) }) => {
                 Ok(Self { welcome, inbound, outbound })
             }
-            Some(_) => Err(Status::internal("it answered something else than a welcome")),
+            Some(_) => Err(Status::internal("it did not answer with a welcome")),
             None => Err(Status::unavailable("it closed the stream")),
         }
     }
@@ -164,7 +164,7 @@ impl Session {
                 }
                 _ = heartbeat.tick() => {
                     worked = true;
-                    // Without room, the waiting messages are signs of life, too.
+                    // If there is no room, the waiting messages are signs of life.
                     let _ = outbound.try_send(convert::heartbeat());
                 }
                 message = inbound.message(), if has_room => match message {
@@ -172,7 +172,7 @@ impl Session {
                         worked = true;
                         state.on_message(message);
                     }
-                    // A kind of message of a later version.
+                    // A later version's kind of message.
                     Ok(Some(WorkResponse { message: None })) => {}
                     Ok(None) => {
                         let reason = "the coordinator closed the stream".into();
@@ -309,13 +309,15 @@ impl SessionState<'_> {
         }
     }
 
-    /// Queues assignments, and fails those that cannot be queued. While the worker drains, it
-    /// drops them, because the coordinator sent them before it knew.
+    /// Queues assignments, and fails those that cannot be queued. While the worker drains, it drops
+    /// assignments: the coordinator sent them before it knew of the draining.
     fn on_assignments(&mut self, assignments: v1::Assignments) {
         let Some(reply) = &self.reply else { return };
         let common = convert::common(&assignments).and_then(|common| {
             let job = self.jobs.get(&common.job);
-            let job = job.ok_or_else(|| format!("no specification of {} came", common.job))?;
+            let job = job.ok_or_else(|| {
+                format!("the coordinator sent no specification of {}", common.job)
+            })?;
             Ok((common, job))
         });
         let mut queued = Vec::with_capacity(assignments.assignments.len());

@@ -34,7 +34,7 @@ pub enum Unhealthy {
     NoSession(PathBuf),
     /// The file is too old.
     #[error(
-        "the worker hangs or was killed: {} was written {age_s} s ago, not {} s",
+        "the worker hangs or was killed: {} is {age_s} s old, although it is written every {} s",
         path.display(), RENEWAL.as_secs()
     )]
     Old {
@@ -125,9 +125,9 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn there_is_a_file_as_long_as_there_is_a_session() {
+    async fn the_file_exists_during_a_session() {
         let (_directory, path) = place();
-        fs::write(&path, "left by one that was killed").unwrap();
+        fs::write(&path, "left by a killed worker").unwrap();
         let file = SessionFile::new(path.clone()).unwrap();
         assert!(matches!(health_check(&path), Err(Unhealthy::NoSession(_))));
         for _session in 0..2 {
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_file_that_is_not_written_any_more_is_old() {
+    async fn a_file_that_is_no_longer_written_is_old() {
         let (_directory, path) = place();
         let file = SessionFile::new(path.clone()).unwrap();
         let session = async {

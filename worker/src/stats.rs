@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-/// A worker's work since its start, and its present work. Counted where it happens, read at any
+/// A worker's work since its start, and its present work. Any thread may update or read it at any
 /// time.
 #[derive(Debug, Default)]
 pub struct Stats {

@@ -78,7 +78,7 @@ async fn a_worker_introduces_itself() {
 }
 
 #[tokio::test]
-async fn results_are_what_was_computed_to_the_bit() {
+async fn results_arrive_without_any_change_of_bits() {
     let mut stage = Stage::new(2, arithmetic).await;
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
@@ -235,7 +235,7 @@ async fn a_result_does_not_wait_for_the_end_of_the_next_item() {
 }
 
 #[tokio::test]
-async fn what_is_being_computed_is_stopped_when_nobody_wants_it_any_more() {
+async fn items_in_progress_that_nobody_wants_are_stopped() {
     let drop_one = Message::DropAssignments(v1::DropAssignments { assignment_ids: vec![1] });
     let end = Message::EndJob(v1::EndJob { job: job(1) });
     for message in [drop_one, end] {
@@ -254,7 +254,7 @@ async fn what_is_being_computed_is_stopped_when_nobody_wants_it_any_more() {
         assert_eq!(coordinator.results(1).await[0].assignment_id, 3);
         permit.send(()).unwrap();
         permit.send(()).unwrap();
-        assert_eq!(coordinator.results(1).await[0].assignment_id, 2, "of 1 nothing is heard");
+        assert_eq!(coordinator.results(1).await[0].assignment_id, 2, "item 1 has no result");
         drop(coordinator);
         stage.end().await;
     }
@@ -273,7 +273,7 @@ async fn a_broken_stream_is_opened_again() {
         coordinator.send_assignments(1, [1]).await;
         coordinator.results(1).await;
     }
-    assert_eq!(process_ids.len(), 1, "it is recognised");
+    assert_eq!(process_ids.len(), 1, "it keeps its process id");
     stage.end().await;
 }
 
@@ -303,7 +303,7 @@ async fn a_version_mismatch_is_fatal_and_any_other_refusal_is_not() {
 }
 
 #[tokio::test]
-async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() {
+async fn a_stopping_worker_delivers_only_its_items_in_progress() {
     let (gated, mut starts, permit) = gated();
     let mut stage = Stage::new(1, gated).await;
     let mut coordinator = stage.conversation().await;
@@ -351,13 +351,13 @@ async fn a_worker_that_gives_up_drops_items_of_scripts_and_finishes_others() {
     assert!(matches!(coordinator.next().await, Some(work_request::Message::Draining(_))));
     stage.give_up.cancel();
     assert_eq!(coordinator.results(1).await[0].assignment_id, 2);
-    assert_eq!(coordinator.next().await, None, "it says nothing of what it dropped");
+    assert_eq!(coordinator.next().await, None, "dropped items have no results");
     drop(coordinator);
     stage.worker.await.unwrap().unwrap();
 }
 
 #[tokio::test]
-async fn hearts_beat_while_all_slots_compute() {
+async fn heartbeats_go_on_while_all_slots_compute() {
     let (gated, mut starts, permit) = gated();
     let mut stage = Stage::new(1, gated).await;
     let mut coordinator = stage.conversation().await;
