@@ -2,8 +2,9 @@
 
 use std::net::{SocketAddr, ToSocketAddrs as _};
 
-/// The address of `HOST:PORT`. HOST is an IP address (IPv6 in brackets) or a name, such
-/// as `localhost`; of a name with several addresses, the first one, IPv4 before IPv6.
+/// The address of `HOST:PORT`. HOST is an IP address (IPv6 in brackets) or a name, such as
+/// `localhost`. If a name has several addresses, the first IPv4 address counts, or else the first
+/// IPv6 address.
 ///
 /// # Errors
 ///
@@ -35,7 +36,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_address_is_answered_with_an_example() {
+    fn an_invalid_address_is_answered_with_an_example() {
         for text in ["", "7700", ":7700", "localhost", "127.0.0.1", "127.0.0.1:70000"] {
             let message = listen_address(text).unwrap_err();
             assert!(message.contains("127.0.0.1:7700"), "{text}: {message}");

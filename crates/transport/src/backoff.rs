@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn a_success_starts_it_over() {
+    fn a_success_starts_the_delays_over() {
         let mut backoff = backoff();
         for _ in 0..100 {
             backoff.next_delay(0.5);

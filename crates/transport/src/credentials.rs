@@ -16,7 +16,7 @@ pub struct Credentials {
     pub authorities: Option<Certificate>,
     /// Client certificate, for a coordinator that requires one.
     pub identity: Option<Identity>,
-    /// The name in the coordinator's certificate, if it is not the address's.
+    /// The name in the coordinator's certificate, if it differs from the address's host.
     pub domain: Option<String>,
     /// Whether the token may be sent unencrypted.
     pub plaintext: bool,

@@ -13,9 +13,9 @@ use x509_parser::parse_x509_certificate;
 
 use crate::tls_diagnosis::date;
 
-/// Time before a certificate's end from which on to warn.
+/// Warnings begin this long before a certificate expires.
 const NOTICE: Duration = Duration::from_hours(14 * 24);
-/// Time between two looks.
+/// Time between two checks.
 const INTERVAL: Duration = Duration::from_hours(24);
 
 /// The expiry dates of the certificates in a program's files.
@@ -26,13 +26,14 @@ pub struct Expiries(Vec<Expiry>);
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Expiry {
     path: PathBuf,
-    /// The last second in which it is valid, since 1970.
+    /// The last second in which the certificate is valid, since 1970.
     at: u64,
 }
 
 impl Expiries {
-    /// The expiry dates of a certificate chain, which needs all of its certificates, and of
-    /// authorities, where one is enough. Ignores unreadable files, which other code reports.
+    /// The expiry dates of a certificate chain and of authorities. A chain expires with its first
+    /// certificate, authorities with their last one. Ignores unreadable files, which other code
+    /// reports.
     pub fn from_files(chain: Option<&Path>, authorities: Option<&Path>) -> Self {
         let chain = chain.and_then(|path| Some((path, ends(path).into_iter().min()?)));
         let authorities = authorities.and_then(|path| Some((path, ends(path).into_iter().max()?)));
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_two_weeks_of_a_certificate_are_said_with_its_date() {
+    fn a_certificate_is_reported_in_its_last_two_weeks() {
         let directory = tempfile::tempdir().unwrap();
         let said = |month, day| {
             let path = file(directory.path(), "own.pem", &[(month, day)]);
@@ -142,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_ends_with_its_first_and_authorities_with_their_last() {
+    fn a_chain_expires_with_its_first_certificate_and_authorities_with_their_last() {
         let directory = tempfile::tempdir().unwrap();
         let path = file(directory.path(), "both.pem", &[(3, 20), (9, 1)]);
         assert_eq!(texts(&Expiries::from_files(Some(&path), None)).len(), 1);
@@ -153,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_certificate_says_nothing() {
+    fn a_file_without_certificates_causes_no_warning() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("none.pem");
         assert_eq!(Expiries::from_files(Some(&path), Some(&path)), Expiries::default());

@@ -31,9 +31,8 @@ pub use throttle::Throttle;
 pub use tls_diagnosis::tls_diagnosis;
 pub use token::{BEARER, Token, TokenError};
 
-/// Largest message to a coordinator, bytes. An experiment file has at most 1 MiB;
-/// 512 results, more than a worker sends at once, of 1,000 trials each have about
-/// 4 MB.
+/// Largest message to a coordinator, bytes. An experiment file has at most 1 MiB. A worker sends at
+/// most 256 results at once; with 1,000 trials each, they have about 2 MB.
 pub const TO_COORDINATOR_LEN_MAX: usize = 8 << 20;
 /// Largest message from a coordinator, bytes: networks as JSON and lists of all experiments are
 /// long.

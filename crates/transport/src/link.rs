@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_address_is_refused() {
+    fn an_invalid_address_is_refused() {
         for address in
             ["", "127.0.0.1:7700", "not an address", "ftp://host:1", "http://", "https://"]
         {
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn tls_wants_somebody_to_believe_and_is_never_left_out_silently() {
+    fn tls_needs_an_authority_and_is_never_left_out_silently() {
         let error = refusal("https://host:1", &with_token());
         assert!(matches!(error, LinkError::NoAuthority(_)), "{error}");
         let domain = Credentials { domain: Some("host".into()), ..Credentials::default() };

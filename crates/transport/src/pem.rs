@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_without_what_it_should_hold_is_named() {
+    fn a_file_that_lacks_its_section_is_named() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.pem");
         fs::write(&path, "-----BEGIN PRIVATE KEY-----\n").unwrap();

@@ -66,7 +66,7 @@ impl ServerCertVerifier for Pin {
         if *certificate == self.expected {
             Ok(ServerCertVerified::assertion())
         } else {
-            Err(Error::General("it shows another certificate".to_owned()))
+            Err(Error::General("the server shows another certificate".to_owned()))
         }
     }
 

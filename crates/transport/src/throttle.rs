@@ -32,7 +32,7 @@ mod tests {
 
     #[test]
     #[expect(clippy::disallowed_methods, reason = "any instant will do")]
-    fn one_line_per_interval_says_how_many_there_were() {
+    fn one_line_per_interval_counts_the_others() {
         let now = Instant::now();
         let mut throttle = Throttle::default();
         assert_eq!(throttle.on_line(now), Some(0));

@@ -47,7 +47,7 @@ pub(crate) fn date(seconds: u64) -> String {
 
 fn explain(error: &TlsError) -> String {
     match error {
-        // The latter comes from an authority of the same name with another key.
+        // `BadSignature`: an authority of the same name has another key.
         TlsError::InvalidCertificate(
             CertificateError::UnknownIssuer | CertificateError::BadSignature,
         ) => "its certificate was signed by none of the authorities in --tls-ca".into(),

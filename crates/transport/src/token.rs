@@ -16,7 +16,7 @@ pub const BEARER: &str = "Bearer ";
 
 /// Fewest characters: 128 bits, written in hexadecimal.
 const LEN_MIN: usize = 32;
-/// Most characters, so that a header has room for it.
+/// Most characters, so that the token fits into a header.
 const LEN_MAX: usize = 1024;
 
 /// A shared secret. Neither `Debug` nor any error shows it.
@@ -57,14 +57,14 @@ impl Token {
     ///
     /// # Errors
     ///
-    /// The problem of the text, which is never quoted.
+    /// The problem of the text, without the text itself.
     pub fn parse(text: &str) -> Result<Self, String> {
         let token = text.trim_ascii();
         if token.is_empty() {
             return Err("is empty".to_owned());
         }
         if !token.bytes().all(|byte| byte.is_ascii_graphic()) {
-            return Err("holds something else than visible ASCII characters".to_owned());
+            return Err("has other characters than visible ASCII".to_owned());
         }
         if !(LEN_MIN..=LEN_MAX).contains(&token.len()) {
             let n = token.len();
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn short_empty_and_unprintable_tokens_are_refused_by_where_they_are() {
+    fn short_empty_and_unprintable_tokens_are_refused_with_their_origin() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("token");
         for bad in ["", "\n", &SECRET[1..], &format!("{SECRET}\0"), &"x".repeat(LEN_MAX + 1)] {
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn one_place_says_what_the_token_is() {
+    fn two_sources_of_a_token_are_refused() {
         assert!(chosen(None, None).unwrap().is_none());
         assert!(chosen(None, Some(SECRET)).unwrap().is_some());
         let error = chosen(Some(Path::new("a-file")), Some(SECRET)).unwrap_err();

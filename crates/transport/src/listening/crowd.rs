@@ -23,10 +23,11 @@ pub struct MemberId(u64);
 pub struct Room {
     /// Number of simultaneous connections; a further one ends another.
     pub n_places: usize,
-    /// Time that each connection has at least to send something.
+    /// Least time that each connection has to send something.
     pub silent_grace: Duration,
-    /// Time that each connection has at least if it sends something. If all are younger, further
-    /// ones wait in the system's queue, so a whole fleet that reconnects at once gets in.
+    /// Least time that a connection keeps its place after it has sent something. While all are
+    /// younger, further connections wait in the system's queue. So a whole fleet that reconnects at
+    /// once gets in.
     pub heard_grace: Duration,
 }
 
@@ -52,8 +53,8 @@ impl Crowd {
         Self { room, members: BTreeMap::new(), n_of_peer: BTreeMap::new(), n_seen: 0 }
     }
 
-    /// Time until the next connection can get a place: until a connection of the peer with the
-    /// most connections has had its time.
+    /// Time until the next connection can get a place. If all are taken, the peer with the most
+    /// connections has to give one up, once one of its connections has had its time.
     pub fn time_to_place(&self, now: Instant) -> Duration {
         if self.members.len() < self.room.n_places {
             return Duration::ZERO;
@@ -72,8 +73,8 @@ impl Crowd {
         grace.saturating_sub(now.saturating_duration_since(member.since))
     }
 
-    /// Adds a connection. Cancelling `has_to_go` tells it to go. Returns whether another one had
-    /// to go.
+    /// Adds a connection. The crowd cancels `has_to_go` when this connection has to go. Returns
+    /// whether another one had to go.
     pub fn enter(
         &mut self,
         now: Instant,
@@ -185,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn those_who_speak_have_more_time() {
+    fn connections_that_send_have_more_time() {
         let now = Instant::now();
         let (mut crowd, entered) = full(now);
         entered.iter().for_each(|(id, _)| crowd.on_heard(*id));
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_made_a_request_last_goes_last() {
+    fn the_connection_with_the_latest_request_goes_last() {
         let now = Instant::now();
         let (mut crowd, entered) = full(now);
         entered.iter().for_each(|(id, _)| crowd.on_request(*id, now));
@@ -229,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_leaves_makes_a_place() {
+    fn a_connection_that_leaves_frees_its_place() {
         let now = Instant::now();
         let (mut crowd, entered) = full(now);
         crowd.on_heard(entered[0].0);

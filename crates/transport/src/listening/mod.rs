@@ -49,7 +49,7 @@ pub struct ListenerLimits {
     pub stall_time: Duration,
 }
 
-/// The handling of one connection too many with a permitted request.
+/// How to handle one permitted connection too many.
 #[derive(Debug, Clone, Copy)]
 pub enum Known {
     /// Its request is refused.

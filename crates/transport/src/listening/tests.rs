@@ -83,7 +83,7 @@ async fn a_peer_that_reads_nothing_for_too_long_loses_its_connection() {
 }
 
 #[tokio::test]
-async fn strangers_make_room_for_others_and_who_is_known_stays() {
+async fn strangers_make_room_for_others_and_known_peers_stay() {
     let places = places(2);
     let (mut known, mut known_far) = connection(&places);
     known.connect_info().admit().unwrap();
@@ -108,7 +108,7 @@ async fn one_known_connection_too_many_is_refused_until_another_ends() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn one_known_connection_too_many_may_end_the_one_that_asked_last_long_ago() {
+async fn one_known_connection_too_many_may_end_the_one_with_the_oldest_request() {
     let places = Places::new(limits(Known::EndsAnother(Room { n_places: 2, ..ROOM })));
     let (mut first, _first_far) = connection(&places);
     let (second, _second_far) = connection(&places);
@@ -129,7 +129,7 @@ async fn a_flood_waits_until_the_strangers_had_time_to_introduce_themselves() {
     let start = Instant::now();
     places.wait_for_one().await;
     assert!(start.elapsed() >= ROOM.silent_grace);
-    // Unless a stranger leaves or is admitted.
+    // A stranger that leaves or is admitted ends the wait earlier.
     strangers.extend([connection(&places)]);
     strangers.truncate(ROOM.n_places);
     strangers[1].0.connect_info().admit().unwrap();
@@ -158,7 +158,7 @@ async fn server(tls: Option<Arc<rustls::ServerConfig>>) -> SocketAddr {
     address
 }
 
-/// Connections that send this and then nothing, more than there are places.
+/// Opens more connections than there are places. Each sends these bytes and then nothing.
 async fn flood(address: SocketAddr, bytes: &[u8]) -> Vec<TcpStream> {
     let mut streams = Vec::new();
     for _ in 0..4 * ROOM.n_places {
