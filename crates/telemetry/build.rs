@@ -1,5 +1,5 @@
-//! Gives the programs the commit that they are built from: from the variable `SWARMEVO_COMMIT`,
-//! or else from git. Debug builds omit it, so that a commit does not recompile them.
+//! Tells the programs their commit: the value of `SWARMEVO_COMMIT`, or else git's. Debug builds
+//! omit it, so that a commit does not recompile them.
 
 use std::{env, process::Command};
 

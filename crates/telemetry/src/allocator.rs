@@ -6,8 +6,8 @@
 
 use std::time::Duration;
 
-/// Blocks above this size are returned to the system at once. By default, glibc adapts this limit
-/// upwards, and then large free blocks lie between used ones.
+/// Blocks above this size are returned to the system at once. By default, glibc raises this limit
+/// as it runs, which leaves large free blocks between used ones.
 const KEPT_LEN_MAX: i32 = 1 << 20;
 /// Interval at which free pages are returned: long enough that page faults cost nothing.
 const GIVE_BACK_EVERY: Duration = Duration::from_secs(20);
@@ -30,7 +30,7 @@ pub(crate) async fn give_back() {
 }
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-#[expect(unsafe_code, reason = "there is no other way to tell the allocator than a call of C")]
+#[expect(unsafe_code, reason = "only a call of C can configure the allocator")]
 mod glibc {
     pub fn set(n_arenas: i32, kept_len: i32) {
         // SAFETY: it takes two numbers, may be called at any time, and locks what it changes.
@@ -41,7 +41,7 @@ mod glibc {
     }
 
     pub fn trim() {
-        // SAFETY: it takes a number, may be called at any time, and touches only what is free.
+        // SAFETY: it takes a number, may be called at any time, and touches only free memory.
         unsafe { libc::malloc_trim(0) };
     }
 }

@@ -53,7 +53,7 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
-    /// Listens; port 0 takes a free one, which the log says.
+    /// Listens on the address. Port 0 takes a free port, which the log shows.
     pub async fn listen(address: SocketAddr) -> Result<Self, ListenError> {
         let error = |source| ListenError { address, source };
         let listener = listening::bind(address).map_err(error)?;
@@ -212,7 +212,7 @@ mod tests {
             taken.push(stream);
         }
         let mut answer = Vec::new();
-        // Ended, properly or not.
+        // The server has ended the connection, properly or not.
         let _ = taken[0].read_to_end(&mut answer).await;
         assert!(answer.is_empty());
     }

@@ -70,8 +70,8 @@ impl LogArgs {
 /// Libraries whose lines report the behaviour of peers.
 const LIBRARIES: [&str; 6] = ["h2", "hyper", "hyper_util", "rustls", "tonic", "tower"];
 
-/// Withholds lines of libraries at INFO and above beyond one per second each, because any peer
-/// can cause any number of them. At a more detailed level, it withholds nothing.
+/// Passes one line per library and second at INFO and above, and withholds the others, because any
+/// peer can cause any number of them. At a more detailed level, it withholds nothing.
 #[derive(Debug, Default)]
 struct LibraryThrottle {
     throttles: Mutex<BTreeMap<&'static str, Throttle>>,
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_librarys_warnings_are_few_and_everything_else_is_there() {
+    fn a_librarys_warnings_are_withheld_and_nothing_else() {
         let lines = Lines::default();
         let sink = lines.clone();
         let layer = fmt::layer().with_writer(move || sink.clone()).with_ansi(false);

@@ -160,7 +160,7 @@ wait_seconds_count 1
     }
 
     #[test]
-    fn what_has_no_series_is_not_mentioned() {
+    fn a_metric_without_series_is_left_out() {
         assert_eq!(Scrape::default().into_text(), "");
     }
 }

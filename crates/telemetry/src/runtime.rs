@@ -1,8 +1,7 @@
 //! The runtime of a program, sized to the threads that the system allows.
 //!
-//! The runtime starts all threads that it needs at its beginning, and keeps them, so that a limit
-//! that is reached later stops nothing. If the system still refuses a thread, the program ends
-//! with one line.
+//! The runtime starts all its threads at the beginning and keeps them, so that a limit reached
+//! later stops nothing. If the system still refuses a thread, the program ends with one line.
 
 use std::{
     fs, io, panic,
@@ -25,14 +24,14 @@ pub const EXIT_STARVED: u8 = 71;
 const BLOCKING_MAX: usize = 32;
 /// Number of these threads that always exist.
 const BLOCKING_KEPT: usize = 2;
-/// Pairs of file descriptors that a program needs at least, in addition to those at its start:
-/// for the database, signals, connections and files.
+/// Least pairs of file descriptors for the database, signals, connections and files, in addition to
+/// those at the program's start.
 const PIPES_MIN: usize = 12;
-/// Further pairs for each processor, because `run` has a worker there, at most for
-/// [`PROCESSORS_MAX`].
+/// Further pairs for each of up to [`PROCESSORS_MAX`] processors, because `run` has a worker on
+/// each.
 const PIPES_PER_PROCESSOR: usize = 2;
 const PROCESSORS_MAX: usize = 32;
-/// Bytes of memory that it needs at least, in addition to stacks of threads.
+/// Least memory in addition to the stacks of threads, bytes.
 const MEMORY_MIN: usize = 64 << 20;
 /// Time for ended threads to disappear, ms.
 const GONE_TIME_MS: usize = 1000;
@@ -96,7 +95,7 @@ pub fn runtime(n_others: usize) -> Result<Runtime, Starved> {
     let n_cores = thread::available_parallelism().map_or(1, Into::into);
     let wanted = Sizes { workers: n_cores, blocking: BLOCKING_MAX };
     find_files(PIPES_MIN + PIPES_PER_PROCESSOR * n_cores.min(PROCESSORS_MAX)).map_err(Starved)?;
-    // The threads are divided after this memory is reserved.
+    // Reserves memory while threads are tried, so that their stacks do not take all of it.
     let memory = find_memory(MEMORY_MIN).map_err(Starved)?;
     let n_before = n_threads();
     let (n_granted, refusal) = granted(n_cores + BLOCKING_MAX + n_others);
@@ -135,7 +134,8 @@ fn find_memory(len: usize) -> io::Result<Vec<u8>> {
     Ok(room)
 }
 
-/// Starts this many threads for blocking work, which all wait for each other.
+/// Starts this many threads for blocking work. They wait for each other, so that none runs two of
+/// these tasks.
 fn keep(runtime: &Runtime, n_kept: usize) {
     let together = Arc::new(Barrier::new(n_kept));
     for _ in 0..n_kept {
@@ -146,8 +146,8 @@ fn keep(runtime: &Runtime, n_kept: usize) {
     }
 }
 
-/// The number of threads, up to `n_max`, that the system starts at the same time, and why no
-/// more.
+/// The number of threads, up to `n_max`, that the system starts at the same time, and why it starts
+/// no more.
 fn granted(n_max: usize) -> (usize, Option<io::Error>) {
     let hold = RwLock::new(());
     let held = hold.write();
@@ -165,7 +165,7 @@ fn granted(n_max: usize) -> (usize, Option<io::Error>) {
     })
 }
 
-/// The system's count of threads; `None` if it does not tell.
+/// The system's count of this program's threads; `None` if it is not known.
 fn n_threads() -> Option<usize> {
     fs::read_dir("/proc/self/task").ok().map(Iterator::count)
 }
@@ -223,14 +223,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_there_is_found_and_what_is_not_is_refused() {
+    fn available_resources_are_found_and_missing_ones_are_refused() {
         find_files(3).unwrap();
         assert_eq!(find_memory(1000).unwrap().len(), 0);
         assert_eq!(find_memory(usize::MAX).unwrap_err().kind(), io::ErrorKind::OutOfMemory);
     }
 
     #[test]
-    fn as_many_threads_are_counted_as_there_are() {
+    fn every_thread_is_counted() {
         let (n_granted, refusal) = granted(5);
         assert_eq!((n_granted, refusal.map(|refusal| refusal.to_string())), (5, None));
     }

@@ -58,7 +58,7 @@ fn escape_if(text: &str, is_unfit: impl Fn(char) -> bool) -> Cow<'_, str> {
     for c in text.chars() {
         if is_unfit(c) {
             for unit in c.encode_utf16(&mut [0; 2]) {
-                write!(escaped, "\\u{unit:04x}").expect("a string takes all");
+                write!(escaped, "\\u{unit:04x}").expect("writing to a string never fails");
             }
         } else {
             escaped.push(c);
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_text_is_escaped_and_text_stays() {
+    fn unprintable_characters_are_escaped_and_text_stays() {
         let plain = "größe 漢字 \"a\" \\ =1+1";
         assert!(matches!(escape(plain), Cow::Borrowed(text) if text == plain));
         let name = "a\u{202e}b\u{1b}[2J\r\n\u{2028}\u{e0041}c\u{9b}";
