@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_address_is_refused_in_one_line() {
+    fn an_invalid_address_is_refused_in_one_line() {
         for text in [
             "",
             "@",

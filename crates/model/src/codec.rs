@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_reads_back() {
+    fn every_message_reads_back() {
         let jobs = [JobId::from(ExperimentId(u64::MAX)), EvaluationId(0).into()];
         for id in jobs {
             assert_eq!(read_job(Some(job(id))), Some(id));
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_trial_set_is_refused() {
+    fn an_invalid_trial_set_is_refused() {
         let beyond = limits::GENERATIONS + 1;
         let beyond = [
             TrialSet::Generation(beyond),

@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_not_many() {
+    fn the_number_of_labels_is_bounded() {
         let many = |n: usize| (0..n).map(|i| (format!("k{i}"), String::new())).collect();
         check(&many(LABELS_MAX)).unwrap();
         check(&many(LABELS_MAX + 1)).unwrap_err();

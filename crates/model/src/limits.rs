@@ -10,14 +10,14 @@ pub const INDIVIDUALS_LEN_MAX: usize = 8 << 20;
 pub const DYNAMICS_PAGE_LEN_MAX: u64 = 100;
 /// Generations that are repeated for one answer with parents and children.
 pub const FAMILIES_PAGE_LEN_MAX: u64 = 100;
-/// Number of children in one answer after which no further generation is added.
+/// An answer with this number of children or more gets no further generation.
 pub const CHILDREN_MAX: usize = 50_000;
 /// Genes of all individuals in the generations of one lineage; a byte each.
 pub const LINEAGE_GENES_MAX: u64 = 256 << 20;
 /// Ancestors in one answer.
 pub const ANCESTORS_MAX: usize = 100_000;
-/// Bytes of a worker's texts about itself and its failures, which are cut there, and of a
-/// client's reason for a pause.
+/// Bytes of a client's reason for a pause, and of a worker's texts about itself and its failures.
+/// Longer texts of a worker are cut.
 pub const TEXT_LEN_MAX: usize = 512;
 /// Bytes of `request_id` and `default_name`.
 pub const KEY_LEN_MAX: usize = 128;

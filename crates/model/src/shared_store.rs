@@ -12,7 +12,7 @@ use tracing::{error, info};
 
 use crate::store::{Store, StoreError};
 
-/// Pause before the second attempt to write; it doubles with every further one.
+/// Pause before the second attempt to write; doubles with every further attempt.
 const RETRY_DELAY_MIN: Duration = Duration::from_millis(250);
 /// Longest pause between attempts.
 const RETRY_DELAY_MAX: Duration = Duration::from_secs(5);

@@ -33,7 +33,7 @@ pub fn bundle(store: &Store, id: ExperimentId) -> Result<Bundle, QueryError> {
     let n_own = log.len();
     let log = (1..).zip(log).map(|(place, entry)| {
         let told = Told::from_bytes(&entry).map_err(|error| undecodable(error.to_string()))?;
-        // An extended run did not end at its first end.
+        // Omits the earlier ends of a run that was extended.
         let end = if place == n_own { told.end } else { End::default() };
         Ok(Told { end, ..told }.to_bytes())
     });

@@ -37,8 +37,8 @@ struct StoredDynamics {
 }
 
 impl StoredDynamics {
-    /// Reads the data of at most a page of generations from `from` on; for a fork, from its own
-    /// first one on.
+    /// Reads the data of at most a page of generations from `from` on. A fork has data of its own
+    /// generations only.
     fn read(store: &Store, id: ExperimentId, from: u64) -> Result<Self, QueryError> {
         let experiment = experiment(store, id)?.record;
         let n_generations = experiment.n_generations();

@@ -26,8 +26,8 @@ pub struct Families {
 }
 
 impl Reader {
-    /// Parents and children in a page of generations from `from` on whose number `every` divides.
-    /// Fails if individuals have no parents.
+    /// Parents and children in a page of generations from `from` on, of those whose number is a
+    /// multiple of `every`. Fails if individuals have no parents.
     pub async fn families(
         &self,
         id: u64,
@@ -44,16 +44,16 @@ impl Reader {
 struct StoredFamilies {
     experiment: StoredExperiment,
     first: u64,
-    /// Select the generations whose number this divides.
+    /// Selects the generations whose number is a multiple of this one.
     every: NonZeroU64,
-    /// The checkpoint before the first generation with parents, and the log from the generation
-    /// before it on; `None` if no generation is to be repeated.
+    /// The checkpoint before the first generation with parents, and the log from one generation
+    /// earlier on; `None` if no generation is to be repeated.
     stored: Option<(Checkpoint, Vec<LogEntry>)>,
 }
 
 impl StoredFamilies {
-    /// Reads at most a page of generations from `from` on. The first one with parents follows the
-    /// first one in the log, which for a fork is its own first one.
+    /// Reads at most a page of generations from `from` on. The first generation in the log (a
+    /// fork's own first one) has no parents there, so families begin with the second.
     fn read(
         store: &Store,
         id: ExperimentId,

@@ -6,9 +6,8 @@ use crate::{ids::ExperimentId, limits::PAGE_LEN_MAX, store::Store};
 
 use super::{QueryError, experiment};
 
-/// Mean fitness over the trials, shape `[generation][individual]`, of at most `n` generations;
-/// and the number of the first one, which is the first in the fitness log that is not before
-/// `from`.
+/// Mean fitness over the trials, shape `[generation][individual]`, of at most `n` generations; and
+/// the number of the first one: `from`, or the start of the fitness log if that is later.
 pub fn fitness(
     store: &Store,
     id: ExperimentId,

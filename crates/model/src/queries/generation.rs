@@ -124,7 +124,7 @@ impl fmt::Display for Gap {
         let first = self.first;
         match (&self.elsewhere, self.gap) {
             (Some((parent, generation)), _) if self.is_there => {
-                write!(f, "it is that of the parent: ask for {parent}@{generation}")
+                write!(f, "the parent has it: ask for {parent}@{generation}")
             }
             (Some((parent, _)), _) => write!(
                 f,
@@ -135,7 +135,7 @@ impl fmt::Display for Gap {
                 write!(f, "its fitness log was pruned before generation {first}")
             }
             (None, LogGap::Damaged) => {
-                write!(f, "its fitness log was damaged, and kept from generation {first} on")
+                write!(f, "its fitness log was damaged, and begins with generation {first}")
             }
             (None, LogGap::None | LogGap::Older | LogGap::Forked) => write!(
                 f,

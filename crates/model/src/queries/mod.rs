@@ -57,13 +57,13 @@ pub enum QueryError {
         n_generations: u64,
     },
     /// The fitness log lacks a generation.
-    #[error("generation {generation} of experiment {experiment} cannot come back: {why}")]
+    #[error("generation {generation} of experiment {experiment} cannot be recovered: {why}")]
     NotInLog {
         /// The experiment.
         experiment: ExperimentId,
         /// The generation.
         generation: u64,
-        /// Why it is not there.
+        /// Why the log lacks the generation.
         why: Gap,
     },
     /// The fitness log differs from the stored one.
@@ -99,12 +99,12 @@ pub enum QueryError {
         /// The experiment.
         experiment: ExperimentId,
     },
-    /// An individual without a lineage, or one that is too large.
+    /// The individual has no lineage, or its lineage is too large.
     #[error("{0}")]
     NoLineage(String),
     /// A recomputed generation differs from the stored one.
     #[error(
-        "generation {generation} of experiment {experiment} does not come back to the same bits: \
+        "generation {generation} of experiment {experiment} is not recovered to the same bits: \
          {what}; use the release that computed it, \"{theirs}\""
     )]
     OtherBits {

@@ -1,4 +1,4 @@
-//! Answers the calls of clients that only read, from a database.
+//! Answers the reading calls of clients from a database.
 
 use std::{io, path::Path, time::Duration};
 
@@ -64,9 +64,8 @@ impl Reader {
         self.news.clone()
     }
 
-    /// Mean fitness over the trials, shape `[generation][individual]`, of at most `n`
-    /// generations; and the number of the first one, which is the first in the fitness log that
-    /// is not before `from`.
+    /// Mean fitness over the trials, shape `[generation][individual]`, of at most `n` generations;
+    /// and the number of the first one: `from`, or the start of the fitness log if that is later.
     pub async fn fitness(
         &self,
         id: u64,

@@ -86,7 +86,7 @@ async fn a_write_that_waits_for_the_disk_does_not_keep_the_coordinator_from_stop
 }
 
 #[tokio::test]
-async fn a_write_that_can_never_succeed_is_given_up_unless_there_is_no_other_way() {
+async fn a_write_that_can_never_succeed_is_given_up_unless_the_program_needs_it() {
     let (_directory, store) = shared();
     let shutdown = CancellationToken::new();
     for (retry, n_expected) in [(Retry::WhileUnavailable, 1), (Retry::Always, 2)] {
@@ -107,13 +107,13 @@ async fn a_write_that_can_never_succeed_is_given_up_unless_there_is_no_other_way
 }
 
 #[tokio::test]
-async fn to_a_damaged_database_nothing_is_written_again_and_the_coordinator_is_told() {
+async fn a_damaged_database_is_not_written_again_and_the_coordinator_learns_of_it() {
     let (_directory, store) = shared();
     let shutdown = CancellationToken::new();
     for retry in [Retry::WhileUnavailable, Retry::Always] {
         let damaged = |_: &mut Store| Err(StoreError::Corrupt("a page".to_owned()));
         let written = store.write(&shutdown, "it", retry, damaged).await;
-        assert!(matches!(written, Written::NotWanted), "no experiment fails of it");
+        assert!(matches!(written, Written::NotWanted), "no experiment fails because of it");
     }
     match store.unusable().await {
         Unusable::Damaged(why) => assert!(why.contains("a page"), "{why}"),

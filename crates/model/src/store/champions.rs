@@ -106,8 +106,8 @@ struct Stored {
     trial_fitness: String,
     genotype: String,
     seal: Vec<u8>,
-    /// Which ends of its intervals are NULL: older versions wrote NULL where they could not
-    /// compute one.
+    /// Whether each end of its intervals is NULL. Older versions wrote NULL for an end that they
+    /// could not compute.
     are_unknown: [bool; 3],
     /// The experiment's latest generation and the digest of everything so far.
     latest: Option<u64>,

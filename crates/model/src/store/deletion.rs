@@ -19,7 +19,7 @@ impl Store {
             if found.state.is_unfinished() {
                 return Err(StoreError::Unfinished(id));
             }
-            // Forks of forks also depend on it, so it is kept even if its own log is gone.
+            // Forks and their forks depend on the experiment even if its own log is gone.
             forks::check_unneeded(transaction, id, 0)?;
             let free_before = free_len(transaction)?;
             for table in TABLES {

@@ -75,7 +75,7 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// The database was opened read-only.
-    #[error("{} is only read", path.display())]
+    #[error("{} is open for reading only", path.display())]
     ReadOnly {
         /// The database.
         path: PathBuf,
@@ -161,7 +161,7 @@ pub enum StoreError {
     Unfinished(ExperimentId),
     /// Forks of the experiment share generations with it that are stored nowhere else.
     #[error(
-        "experiment {id} has generations of its {} in its fitness log, and nothing else has them; \
+        "the fitness log of experiment {id} has the only copy of generations of its {}; \
          to lose them, delete {} first: {}",
         named(forks, "fork", "forks"),
         if forks.len() == 1 { "that" } else { "those" },

@@ -12,7 +12,7 @@ use super::{
 /// Filters of a list of experiments, which must pass all of them.
 #[derive(Debug, Clone, Default)]
 pub struct Filter {
-    /// In the group of this name, or, if no group has it, with this name themselves.
+    /// In the group of this name; if there is no such group, experiments of this name.
     pub named: Option<String>,
     /// In one of these states; empty: in any.
     pub states: Vec<ExperimentState>,
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_is_that_of_a_group_before_it_is_that_of_experiments() {
+    fn a_name_means_a_group_or_else_experiments() {
         let (_directory, store) = store();
         let named =
             |name: &str| ids(&store, Filter { named: Some(name.into()), ..Filter::default() });
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn all_that_is_wanted_holds_together() {
+    fn experiments_have_to_pass_all_filters() {
         let (_directory, store) = store();
         let all = Filter::default;
         assert_eq!(ids(&store, all()), [1, 2, 3, 4]);

@@ -58,7 +58,7 @@ pub struct Holder {
 }
 
 impl Locks {
-    /// Writes the holder's name into the lock file. A lock without a name is as good.
+    /// Writes the holder's name into the lock file. The lock also works without a name.
     pub fn announce(&self, address: Option<&str>) {
         let text = format!("{}\n{}\n", std::process::id(), address.unwrap_or_default());
         let mut file = &self.directory;
@@ -216,7 +216,8 @@ pub fn open_read_only(path: &Path) -> rusqlite::Result<Connection> {
     let connection = if write_ahead_log::exists(path) {
         Connection::open_with_flags(path, flags)?
     } else {
-        // Without a log, no program uses the database; SQLite would create a log.
+        // If there is no log, no program uses the database. `immutable` keeps SQLite from creating
+        // one.
         flags |= OpenFlags::SQLITE_OPEN_URI;
         Connection::open_with_flags(format!("{}?immutable=1", uri(path)), flags)?
     };

@@ -97,7 +97,7 @@ pub fn checkpoint(
          ORDER BY n_generations DESC LIMIT 1",
     )?;
     let read = |row: &rusqlite::Row<'_>| {
-        // Text in older databases.
+        // Older databases store text.
         let state = row.get_ref(1)?.as_bytes()?.to_vec();
         Ok((row.get::<_, u64>(0)?, state, row.get::<_, Vec<u8>>(2)?))
     };
@@ -134,8 +134,8 @@ pub fn checkpoint(
     Ok(Some(Checkpoint { keyframe, log, n_flat }))
 }
 
-/// Number of generations directly before this one in which all individuals had equal fitness, as
-/// far as the log shows.
+/// Number of consecutive generations before generation `end` in which all individuals had equal
+/// fitness, as far as the log reaches.
 fn n_flat_before(connection: &Connection, id: ExperimentId, end: u64) -> rusqlite::Result<u64> {
     let mut statement = connection.prepare_cached(
         "SELECT generation, best = min, told

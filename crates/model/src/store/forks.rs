@@ -96,7 +96,7 @@ pub fn get(
     };
     match statement.query_row([id.0], read).optional()? {
         Some(None) => {
-            let what = format!("where experiment {id} was forked is not what was stored");
+            let what = format!("the origin of experiment {id} is not what was stored");
             Err(StoreError::Corrupt(what))
         }
         Some(fork) => Ok(fork),

@@ -1,8 +1,8 @@
 //! The coordinator's memory: a SQLite database with every completed generation, from which a
 //! killed coordinator continues.
 //!
-//! Every method that changes data is one transaction. It is on disk when the method returns, and
-//! fails if another coordinator owns the database by now.
+//! Every method that changes data is one transaction. The transaction is on disk when the method
+//! returns, and fails if another coordinator has taken over the database.
 
 mod champions;
 mod deletion;
@@ -411,7 +411,7 @@ impl Store {
         operation: impl FnOnce(&Transaction<'_>, &Sealer) -> Result<T>,
     ) -> Result<T> {
         let result = self.transact(operation).map_err(|error| error.at(&self.path))?;
-        // The write is on disk anyway; the next one tries this again.
+        // The write is on disk anyway, and the next write tries again to fold the log.
         let _ = write_ahead_log::fold_if_long(&self.connection);
         Ok(result)
     }

@@ -28,7 +28,7 @@ const SUMMARIES: i64 = 11;
 /// Makes a database of an older version readable as if it had the latest one, without changing
 /// it. Missing seals are empty.
 pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result<()> {
-    // In the temporary schema, in which SQLite looks names up first.
+    // The views are in the temporary schema, in which SQLite looks names up first.
     let if_before = |first, columns: &str| match version < first {
         true => columns.to_owned(),
         false => String::new(),

@@ -115,9 +115,8 @@ pub struct ExperimentRecord {
     pub submitted_at_ms: u64,
     /// Latest completed generation.
     pub latest: Option<GenerationRecord>,
-    /// The last link after the latest generation, of the re-evaluations' digest chain if the
-    /// generation had a re-evaluation, otherwise of the generations' chain; empty before the
-    /// first.
+    /// The latest link of a digest chain: of the re-evaluations' chain if the latest generation had
+    /// a re-evaluation, otherwise of the generations' chain. Empty before the first generation.
     pub digest: String,
     /// Mean fitness of the present champion on the held-out trials that selected it; `None`
     /// before the first re-evaluation.

@@ -361,7 +361,8 @@ pub fn missing(connection: &Connection) -> Option<String> {
     })
 }
 
-/// Why a database cannot be migrated. An error that is a bug elsewhere means another schema here.
+/// Why a database cannot be migrated. Elsewhere, such an error is a bug; here it shows another
+/// schema.
 fn of_other_tables(error: rusqlite::Error) -> StoreError {
     let error = match StoreError::from(error) {
         StoreError::Bug(error) => error.to_string(),

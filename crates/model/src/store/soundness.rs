@@ -63,12 +63,12 @@ pub fn resumable(
         Err(StoreError::Corrupt(what)) => return Ok(Err(what)),
         other => other?,
     };
-    let Some(found) = found else { return Ok(Err("it is not there".to_owned())) };
+    let Some(found) = found else { return Ok(Err("it does not exist".to_owned())) };
     let (seal, expected) = seals::experiment_seal(connection, sealer, id)?;
     if seal != expected {
         return Ok(Err("its configuration is not what was stored".to_owned()));
     }
-    // The seal of the row.
+    // Checks the seal of the fork's row.
     if let Err(StoreError::Corrupt(what)) = forks::get(connection, Some(sealer), id) {
         return Ok(Err(what));
     }

@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_database_and_the_file_say_the_same_and_all_digits_of_a_seed() {
+    fn the_database_and_the_file_agree_to_the_last_digit_of_a_seed() {
         let directory = tempfile::tempdir().unwrap();
         let mut store = Store::open(directory.path()).unwrap();
         let config_json = include_str!("../../../../configs/quickstart.json").to_owned();
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_summary_is_empty() {
+    fn an_invalid_summary_is_empty() {
         for text in [None, Some(""), Some("[]"), Some("[1, \"\"]"), Some("[-1, 2, 3]")] {
             assert_eq!(Summary::from_column(text), Summary::default());
         }

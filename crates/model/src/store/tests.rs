@@ -86,7 +86,7 @@ fn open() -> (tempfile::TempDir, Store) {
 }
 
 #[test]
-fn what_is_committed_is_there_after_reopening_bit_for_bit() {
+fn commits_are_there_after_reopening_bit_for_bit() {
     let (directory, mut store) = open();
     let new = new_experiment(None);
     let (id, _) = store.create(&new, 5).unwrap();
@@ -109,7 +109,7 @@ fn what_is_committed_is_there_after_reopening_bit_for_bit() {
 }
 
 #[test]
-fn a_champion_keeps_its_origin_and_its_fitness_of_both_kinds_apart() {
+fn a_champion_keeps_its_origin_and_both_kinds_of_fitness() {
     let (_directory, mut store) = open();
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
     let held_out =
@@ -173,7 +173,7 @@ fn a_request_id_creates_one_experiment() {
 }
 
 #[test]
-fn events_tell_the_whole_story_in_order_and_from_any_number() {
+fn events_are_complete_ordered_and_readable_from_any_number() {
     let (_directory, mut store) = open();
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
     commit(&mut store, id, 0, None).unwrap();
@@ -254,7 +254,7 @@ fn an_ended_experiment_takes_no_more_generations_and_ends_once() {
 }
 
 #[test]
-fn an_experiment_goes_on_from_the_end_that_is_meant_and_no_other() {
+fn an_experiment_is_reopened_only_from_the_given_state() {
     let (_directory, mut store) = open();
     let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
     let [completed, cancelled] = ids;
@@ -269,7 +269,7 @@ fn an_experiment_goes_on_from_the_end_that_is_meant_and_no_other() {
     assert_eq!((states[0].config_json.as_str(), states[0].is_archived), ("longer", false));
     assert_eq!(states[1].state, ExperimentState::Cancelled);
     assert_ne!(states[1].config_json, "longer");
-    assert_eq!(store.events(cancelled, 1, 100).unwrap().len(), 2, "nothing has happened to it");
+    assert_eq!(store.events(cancelled, 1, 100).unwrap().len(), 2, "it has no further event");
     commit(&mut store, completed, 1, None).unwrap();
     store.reopen(cancelled, ExperimentState::Cancelled, "same", "resumed", 8).unwrap();
     commit(&mut store, cancelled, 0, None).unwrap();
@@ -343,7 +343,7 @@ fn a_generation_that_cannot_be_committed_leaves_nothing_behind() {
 }
 
 #[test]
-fn pruning_frees_the_log_of_an_ended_experiment_and_leaves_what_it_continues_from() {
+fn pruning_frees_the_log_of_an_ended_experiment_and_keeps_its_latest_state() {
     let (directory, mut store) = open();
     let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
     for number in 0..3 {
@@ -417,7 +417,7 @@ fn a_coordinator_killed_while_it_creates_the_database_creates_it_again() {
 }
 
 #[test]
-fn a_pause_is_kept_with_its_reason_and_takes_a_evaluated_generation() {
+fn a_pause_keeps_its_reason_and_still_takes_an_evaluated_generation() {
     let (directory, mut store) = open();
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
     store.set_state(id, 6, ExperimentState::Paused, "for lunch").unwrap();

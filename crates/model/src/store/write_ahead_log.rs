@@ -1,11 +1,11 @@
 //! Marks the main file of a database in use, so that a copy without its write-ahead log can be
 //! recognised.
 //!
-//! SQLite appends commits to a log beside the main file, and moves them there from time to time.
-//! The main file alone is a sound database of an earlier moment, and a copy of it passes for the
-//! whole. So the main file contains a flag that it needs its log, and the log clears this flag.
-//! Both together are complete, also after any program has merged them. The main file without the
-//! log still has the flag.
+//! SQLite appends commits to a log beside the main file, and moves them into the main file from
+//! time to time. The main file alone is a sound database of an earlier moment, so a copy of it
+//! could pass for the whole. Therefore the main file contains a flag, "needs its log", and the log
+//! clears this flag. Both files together have no flag, also after any program has merged them. A
+//! copy of the main file alone has the flag.
 
 use std::{
     fs,

@@ -58,14 +58,15 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     if is_sealed && !has_log && write_ahead_log::is_missed(&source)? {
         return Err(StoreError::WithoutLog { path: from.to_owned() });
     }
-    // One read transaction, so later commits are not in the copy. Unused pages are omitted.
+    // The statement reads in one transaction, so the copy has no later commits. It omits unused
+    // pages.
     let to_name = to.to_str().ok_or_else(|| StoreError::Target {
         path: to.to_owned(),
         source: io::Error::other("its name is not UTF-8"),
     })?;
     source.execute("VACUUM INTO ?1", [to_name])?;
     if is_sealed {
-        // The original may just have moved its log into the main file.
+        // The original has the flag if it has just moved its log. The copy needs no log.
         write_ahead_log::set_missed(&Connection::open(to)?, false)?;
     }
     Ok(())

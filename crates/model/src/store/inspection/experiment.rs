@@ -106,7 +106,7 @@ impl Fate {
     pub fn next_step(self, restore: &str) -> String {
         let outcome = match self {
             Self::Kept => "that keeps the rest of the experiment",
-            Self::Restarted => "that has the experiment computed again, to the same bits",
+            Self::Restarted => "that recomputes the experiment, to the same bits",
             Self::Lost => "that loses the experiment: submit it again",
         };
         format!("{restore}; {outcome}")
@@ -133,7 +133,7 @@ impl Inspected {
                         .is_some());
         }
         let events = keep(&mut problems, read_events(connection, id, history.as_deref()));
-        // The verdict of the coordinator itself, which continues an ended experiment only on
+        // Adds the coordinator's own verdict. The coordinator continues an ended experiment only on
         // request.
         let is_unfinished = row.as_ref().is_some_and(ExperimentRow::is_unfinished);
         if let (true, true, Some(sealer)) = (is_unfinished, can_go_on, sealer) {
@@ -166,7 +166,7 @@ impl Inspected {
     fn find_what_is_missing(&mut self) {
         let Some(row) = &self.row else { return };
         if row.state.is_none() {
-            self.problems.push("its state is not a state".to_owned());
+            self.problems.push("its state is unknown".to_owned());
         }
         let has_ended = row.state.is_some_and(|state| !state.is_unfinished());
         let n_shared = row.fork.as_ref().map_or(0, |fork| fork.generation + 1);
@@ -323,7 +323,7 @@ fn read_events(
     let generations = events.iter().filter_map(|event| event.generation);
     match history {
         Some(history) if !generations.eq(0..history.len() as u64) => {
-            Err("its events and its history are not of the same generations".to_owned())
+            Err("its events and its history have different generations".to_owned())
         }
         _ => Ok(events),
     }

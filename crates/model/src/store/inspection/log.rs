@@ -18,8 +18,8 @@ pub struct SoundLog {
     pub gap: LogGap,
 }
 
-/// Finds the longest sound end of a log; `None` if not even a keyframe after the latest
-/// generation is sound. Adds the damage to `problems`.
+/// Finds the longest sound end of a log; `None` if no keyframe is sound, not even one after the
+/// latest generation. Adds the damage to `problems`.
 pub fn read(
     connection: &Connection,
     sealer: Option<&Sealer>,
@@ -76,7 +76,7 @@ fn find(
     })
     .map_err(&unreadable)?;
     if next.is_some_and(|next| next != history.len() as u64) {
-        return Err("its fitness log and its history are not of the same generations".to_owned());
+        return Err("its fitness log and its history have different generations".to_owned());
     }
     let mut first = None;
     each(connection, "keyframes", "n_generations", "state", id, |n_generations, state, seal| {
@@ -114,7 +114,7 @@ fn each(
     Ok(())
 }
 
-/// Text in older databases.
+/// Bytes of a column, which is text in older databases.
 fn bytes_of<'a>(row: &'a Row<'_>, column: usize) -> rusqlite::Result<&'a [u8]> {
     Ok(row.get_ref(column)?.as_bytes()?)
 }

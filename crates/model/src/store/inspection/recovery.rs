@@ -19,7 +19,7 @@ use crate::{ids::ExperimentId, submission::Submission};
 
 /// The reason of the pause of a restarted experiment.
 const BEGINS_AGAIN: &str = "recovered from a damaged database without its generations: resume it to \
-                            have them computed again, to the same bits";
+                            recompute them, to the same bits";
 
 /// The outcome of a recovery.
 #[derive(Debug)]

@@ -96,7 +96,7 @@ impl Source {
         ids.into_iter().map(ExperimentId).collect()
     }
 
-    /// Whether the experiment exists, or cannot be excluded.
+    /// Whether the experiment exists, or may exist.
     fn may_have(&self, id: u64) -> bool {
         let sql = "SELECT count(*) FROM experiments WHERE id = ?1";
         self.connection.query_row(sql, [id], |row| row.get(0)).unwrap_or(true)

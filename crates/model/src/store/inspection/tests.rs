@@ -79,7 +79,7 @@ pub fn findings(directory: &Path) -> Vec<(Option<u64>, String)> {
     findings.into_iter().map(|f| (f.experiment.map(|id| id.0), f.what)).collect()
 }
 
-/// Everything of the experiments in a directory, bit for bit.
+/// All data of the experiments in a directory, bit for bit.
 fn contents(store: &Store) -> Vec<String> {
     let experiments = store.experiments(&Filter::default()).unwrap();
     let all = experiments.iter().map(|experiment| {
@@ -167,7 +167,7 @@ fn rows_without_an_experiment_are_found() {
 }
 
 #[test]
-fn a_copy_without_its_log_is_found_and_what_is_in_it_can_be_kept() {
+fn a_copy_without_its_log_is_found_and_its_content_can_be_kept() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = store_in(directory.path());
     drop(store);
@@ -195,7 +195,7 @@ fn recovery_of_a_sound_database_is_a_copy() {
 }
 
 #[test]
-fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
+fn recovery_keeps_sound_experiments_and_restarts_computable_ones() {
     let directory = data_directory();
     edit(
         directory.path(),
@@ -228,7 +228,7 @@ fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
 }
 
 #[test]
-fn what_of_a_damaged_log_is_sound_is_kept() {
+fn the_sound_part_of_a_damaged_log_is_kept() {
     let directory = data_directory();
     let [running, ended] = [2, 1].map(ExperimentId);
     let mut store = Store::open(directory.path()).unwrap();
@@ -250,7 +250,7 @@ fn what_of_a_damaged_log_is_sound_is_kept() {
         (found.log_from, found.log_gap)
     };
     assert_eq!(log_of(running), (3, LogGap::Damaged));
-    // Only the lost part of the log has the number of generations with equal fitness.
+    // Only the lost part of the log shows how many generations had equal fitness.
     assert_eq!(store.resumable(running).unwrap().1, Checkpoint { n_flat: 0, ..before });
     assert_eq!(log_of(ended), (3, LogGap::Damaged), "its results are not damaged");
 }
@@ -294,11 +294,14 @@ fn no_damaged_page_gets_into_a_recovered_directory() {
         assert!(inspect(&to).unwrap().findings.is_empty(), "page {page}");
     }
     assert!(n_kept > 10 && n_lost > 0, "{n_kept} {n_lost}");
-    assert!(n_harmless <= n_free, "only pages that hold nothing: {n_harmless} of {n_free}");
+    assert!(
+        n_harmless <= n_free,
+        "damage is harmless on empty pages only: {n_harmless} of {n_free}"
+    );
 }
 
 #[test]
-fn a_database_that_was_cut_off_is_read_as_far_as_it_goes() {
+fn a_truncated_database_is_read_as_far_as_it_goes() {
     let sound = data_directory();
     let bytes = fs::read(file::path_in(sound.path())).unwrap();
     let mut n_left = Vec::new();
@@ -321,7 +324,7 @@ fn a_database_that_was_cut_off_is_read_as_far_as_it_goes() {
 }
 
 #[test]
-fn older_schemas_are_looked_at_and_recovered_without_a_change() {
+fn databases_of_older_schemas_are_inspected_and_recovered_unchanged() {
     let directory = data_directory();
     let mut store = Store::open(directory.path()).unwrap();
     advance_to(true, &mut store, ExperimentId(2), None);

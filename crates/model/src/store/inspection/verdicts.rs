@@ -1,4 +1,4 @@
-//! Damage of every kind: all programs that meet it agree on the verdict.
+//! All programs agree on the verdict about every kind of damage.
 
 use std::{fs, path::Path};
 
@@ -74,14 +74,14 @@ fn doctor_and_coordinator_give_the_same_verdict_of_every_kind_of_damage() {
         let coordinator = Store::open(directory.path()).map(|store| goes_on(&store, RUNNING));
         let goes_on_here = coordinator.unwrap_or(false);
         assert!(goes_on_here || is_found, "{sql}: only the coordinator says that it is damaged");
-        // An experiment that continues may have damage on which no run depends, such as to its
+        // An experiment that continues may be damaged where no run depends on it, such as in its
         // events.
         if goes_on_here {
             n_harmless += 1
         } else {
             n_damaged += 1
         }
-        // A recovered copy is sound, by both.
+        // Both find a recovered copy sound.
         let recovered = directory.path().join("recovered");
         recover(directory.path(), &recovered).unwrap();
         assert_eq!(findings(&recovered), [], "{sql}");
@@ -99,7 +99,7 @@ fn doctor_and_coordinator_give_the_same_verdict_of_every_kind_of_damage() {
 }
 
 #[test]
-fn a_damaged_experiment_takes_no_other_ones_backup() {
+fn a_damaged_experiment_does_not_prevent_the_backup_of_others() {
     let directory = data_directory();
     edit(directory.path(), "UPDATE champions SET trial_fitness = '[null]' WHERE experiment_id = 1");
     let to = directory.path().join("copy");
@@ -133,7 +133,7 @@ fn a_champion_whose_interval_older_versions_could_not_compute_is_read() {
     for nan in [f64::NAN, -f64::NAN] {
         let transaction = store.connection().unchecked_transaction().unwrap();
         super::super::champions::put(&transaction, &sealer, id, &champion, None, "").unwrap();
-        // Sealed as by an older version, which stored NaN as NULL.
+        // Makes the seal as an older version did, which stored NaN as NULL.
         let seal = sealer
             .begin("champion", id)
             .number(0)
@@ -220,7 +220,7 @@ fn tables_of_another_program_are_refused_in_one_short_line() {
 }
 
 #[test]
-fn of_a_recovered_experiment_that_has_ended_nobody_says_that_it_is_damaged() {
+fn every_program_finds_a_recovered_ended_experiment_sound() {
     let directory = data_directory();
     edit(
         directory.path(),
@@ -251,7 +251,7 @@ fn fork_of(store: &mut Store, parent: ExperimentId) -> ExperimentId {
 }
 
 #[test]
-fn what_forks_need_is_deleted_after_them_only() {
+fn generations_that_forks_need_are_deleted_only_after_the_forks() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = Store::open(directory.path()).unwrap();
     let (parent, _) = store.create(&new_experiment(None), 5).unwrap();

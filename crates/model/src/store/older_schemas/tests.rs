@@ -79,7 +79,7 @@ fn contents(store: &Store) -> Vec<String> {
 }
 
 #[test]
-fn databases_of_every_version_open_and_keep_what_they_have() {
+fn databases_of_every_version_open_and_keep_their_data() {
     for version in 1..=VERSION {
         let directory = tempfile::tempdir().unwrap();
         let mut store = Store::open(directory.path()).unwrap();

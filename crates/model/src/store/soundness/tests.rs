@@ -21,7 +21,7 @@ fn two_experiments(directory: &Path) -> (Store, [ExperimentId; 2]) {
 }
 
 #[test]
-fn what_was_edited_or_moved_is_found_and_its_neighbour_is_not_blamed() {
+fn edited_and_moved_rows_are_found_and_their_neighbours_are_not_blamed() {
     for (edit, what) in [
         ("UPDATE experiments SET config = replace(config, '1', '2') WHERE id = 1", "configuration"),
         ("UPDATE experiments SET config_digest = 'd' WHERE id = 1", "configuration"),
@@ -241,7 +241,7 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
 }
 
 #[test]
-fn bytes_that_are_no_text_and_rows_that_are_gone_are_damage_with_the_path() {
+fn invalid_text_and_missing_rows_are_damage_with_the_path() {
     let directory = tempfile::tempdir().unwrap();
     let (mut store, [id, _]) = two_experiments(directory.path());
     let path = file::path_in(directory.path()).display().to_string();
