@@ -1,6 +1,6 @@
-//! Measures lists in a data directory with ten thousand experiments of the size of A, from
-//! request to answer: all experiments, running ones, those of a name, and the first open of the
-//! database. An argument gives another number of experiments; TMPDIR=/dev/shm makes their
+//! Measures lists in a data directory with ten thousand experiments of the size of A, from request
+//! to answer: all experiments, running ones, those of a name. Also measures the first opening of
+//! the database. An argument gives another number of experiments; TMPDIR=/dev/shm makes their
 //! creation much faster.
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures time")]
 

@@ -97,8 +97,8 @@ impl Costs {
         ideal.as_secs_f64() / ideal.max(one_trial).as_secs_f64()
     }
 
-    /// The shortest time of a scheduler that knows all speeds, but not the duration of each
-    /// trial, and assigns all trials at once, with the best margin for long trials.
+    /// The shortest time of a scheduler that knows all speeds, but not the duration of each trial.
+    /// It assigns all trials at once, with the best margin for long trials.
     fn with_known_speeds(self, population_size: usize, n_workers: usize) -> f64 {
         let margins = (0..=8).map(|half| f64::from(half) / 2.0);
         let times = margins.map(|margin| self.planned_time(population_size, n_workers, margin));

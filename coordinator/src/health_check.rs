@@ -103,7 +103,10 @@ async fn ask(address: SocketAddr, tls: Option<&Tls>) -> Result<(), Unhealthy> {
                 .connect(name, io)
                 .await
                 .map_err(|source| Unhealthy::Tls { address, source })?;
-            (channel(io).await, "if it asks for client certificates, its own has to be one")
+            (
+                channel(io).await,
+                "if it requires client certificates, its own certificate must be valid as one",
+            )
         }
         None => (channel(io).await, "does it serve TLS? Then pass its --tls-cert and --tls-key"),
     };

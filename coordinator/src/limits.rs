@@ -50,8 +50,8 @@ pub const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
 
 /// Time for a new worker's stream to say `Hello`.
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
-/// Length in bytes up to which a message or an answer is not counted; the number of calls bounds
-/// these.
+/// Messages and answers up to this number of bytes are not counted: the number of calls bounds
+/// them.
 pub const SHORT_LEN: usize = 64 << 10;
 /// Bytes of long messages that arrive, including their decoded form; more wait. Each takes three
 /// times its length until it is decoded.
@@ -70,12 +70,12 @@ pub const WINDOW_LEN: u32 = 256 << 10;
 /// Number of results in one message; our worker sends fewer. On the wire an empty result takes
 /// two bytes, in memory fifty.
 pub const RESULTS_PER_MESSAGE_MAX: usize = 1 << 16;
-/// Number of messages, beyond one per credit, that may wait for a worker to read them; beyond it,
-/// the coordinator drops the worker.
+/// Number of messages, in addition to one per credit, that may wait for a worker to read them. If
+/// there are more, the coordinator drops the worker.
 pub const WORKER_OUTBOX_SLACK: usize = 64;
 
-/// Bytes of the list of problems of a configuration, which travels in a header, whose size
-/// clients limit.
+/// Bytes of a configuration's list of problems. The list travels in a header, and clients limit
+/// headers.
 pub const PROBLEMS_LEN_MAX: usize = 4096;
 /// Default of the estimated memory that all unfinished experiments together may take, MiB. It
 /// does not depend on the machine, so that all machines accept the same experiments.
@@ -83,7 +83,7 @@ pub const MEMORY_BUDGET_MIB: u32 = 4096;
 /// Time for a client's change to be stored; after it, the client hears that the change is not
 /// stored yet.
 pub const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
-/// Number of evaluations in progress at the same time; more wait, as open calls.
+/// Number of evaluations in progress at the same time; further calls wait.
 pub const EVALUATIONS_MAX: usize = 16;
 /// Bytes of experiment files and genotypes of clients' requests in progress: some thirty of the
 /// largest evaluations, or thousands of usual ones.
@@ -97,7 +97,8 @@ pub const EVALUATION_VALUES_MAX: usize = 1 << 21;
 pub const TRIAL_VALUES_MAX: usize = 1 << 18;
 /// Pause between two messages of news.
 pub const NEWS_PAUSE: Duration = Duration::from_millis(200);
-/// Longest time until a watcher of explanations hears of changes that time alone makes.
+/// Longest time until a watcher of explanations hears of a change that no event announces, such as
+/// a barrier.
 pub const SITUATION_INTERVAL: Duration = Duration::from_secs(5);
 /// Events read from the store at once.
 pub const EVENT_PAGE_LEN: u32 = 256;

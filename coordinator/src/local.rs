@@ -82,7 +82,7 @@ impl LocalRun {
         let mut this = Self { store, id };
         if this.record()?.state == ExperimentState::Paused {
             let (running, now) = (ExperimentState::Running, clock::unix_ms());
-            this.store.set_state(id, now, running, "goes on in the process that asked for it")?;
+            this.store.set_state(id, now, running, "goes on in the process that requested it")?;
         }
         Ok(this)
     }

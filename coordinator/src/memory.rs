@@ -121,7 +121,7 @@ mod tests {
     /// Measured over three generations with a worker, less the memory of a coordinator without
     /// experiments: 268, 799 and 401 MiB.
     #[test]
-    fn the_estimates_are_not_below_what_was_measured() {
+    fn estimates_are_not_below_measurements() {
         assert_eq!(mib("SNES", 20_000, 1, 424), 264);
         assert_eq!(mib("GA", 20_000, 1, 424), 846);
         assert_eq!(mib("CMA-ES", 20_000, 1, 424), 410);

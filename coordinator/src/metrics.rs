@@ -80,8 +80,8 @@ metrics! {
         "Items that workers hold and have not answered, duplicates included.";
 }
 
-/// Upper bounds of the buckets for commits, s: a fast disk takes less than 1 ms, a busy one
-/// tenths of a second. A full disk takes until there is space.
+/// Upper bounds of the buckets for commits, s: a fast disk takes less than 1 ms, a busy one tenths
+/// of a second. On a full disk, a commit takes until there is space.
 const COMMIT_BOUNDS_S: [f64; 13] =
     [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0];
 

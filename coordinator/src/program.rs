@@ -168,7 +168,7 @@ async fn report_health(args: &Args) -> ExitCode {
     };
     match health.await {
         Ok(()) => {
-            // The exit code also says it, for callers that do not read the line.
+            // If nobody reads the line, the exit code still tells the result.
             let _ = writeln!(io::stdout(), "healthy: the coordinator on {} serves", args.listen);
             ExitCode::SUCCESS
         }

@@ -90,7 +90,7 @@ fn free_address() -> SocketAddr {
 
 fn spawn(address: &str, pages: SocketAddr, data_dir: &TempDir) -> Child {
     let log = File::create(data_dir.path().join("log")).expect("a new directory can be written");
-    // As in the harness of the fleet tests: programs of another version.
+    // As in the harness of the fleet tests, the variable can name programs of another version.
     let program = env::var_os("SWARM_PROGRAMS").map_or_else(
         || env!("CARGO_BIN_EXE_coordinator").into(),
         |programs| PathBuf::from(programs).join("coordinator"),

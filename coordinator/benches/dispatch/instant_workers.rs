@@ -91,7 +91,7 @@ impl InstantWorkers {
 }
 
 impl Round {
-    /// From the first item to the last answer.
+    /// Time from the first item to the last answer.
     pub fn evaluating(&self) -> Duration {
         self.ended - self.started
     }

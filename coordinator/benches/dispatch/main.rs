@@ -137,8 +137,8 @@ impl GenerationParts {
     }
 }
 
-/// From the first item of a generation to the first of the next, with two workers
-/// of eight slots.
+/// Time from the first item of a generation to the first item of the next one, with two workers of
+/// eight slots.
 async fn generation_ms(file: &str) -> GenerationParts {
     let file = experiment(file, 100, FOREVER);
     let coordinator = CoordinatorProcess::start();
@@ -151,11 +151,11 @@ async fn generation_ms(file: &str) -> GenerationParts {
     GenerationParts { all: median(&all), alone: alone::measure(&file) }
 }
 
-/// A generation of 100 with a thousand workers, after ten thousand generations: stretches
-/// without pages and with 50 of them, by turns.
+/// Durations of generations of 100 with a thousand workers, after ten thousand generations:
+/// stretches without pages, in turns with stretches with 50 pages.
 async fn beside_pages_ms() -> (Vec<f64>, Vec<f64>) {
     const N_BEFORE: u64 = 10_000;
-    // Some four seconds: pages look every two.
+    // Some four seconds, because pages send requests every two seconds.
     const STRETCH: u64 = 1_200;
     let coordinator = CoordinatorProcess::start();
     let workers = InstantWorkers::start(&coordinator, 2, 8);
@@ -188,8 +188,8 @@ async fn peak_memory_mib() -> f64 {
     coordinator.peak_memory_mib()
 }
 
-/// From the start of the process, killed after 1,000 generations, to the first
-/// item's arrival at a worker that tries to connect every millisecond.
+/// Time from the restart of a process that was killed after 1,000 generations to the arrival of the
+/// first item at a worker. The worker tries to connect every millisecond.
 async fn restart_s() -> f64 {
     let mut coordinator = CoordinatorProcess::start();
     let workers = InstantWorkers::start(&coordinator, 2, 8);

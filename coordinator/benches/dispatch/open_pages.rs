@@ -1,4 +1,4 @@
-//! Sends the requests of pages that are open in browsers, as often as they do.
+//! Sends the requests of open pages as often as browsers do.
 
 use std::{
     net::SocketAddr,
@@ -27,8 +27,8 @@ pub struct OpenPages {
 }
 
 impl OpenPages {
-    /// Opens `n` pages of the first experiment, every fifth of them that of the fleet, and waits
-    /// until they have loaded.
+    /// Opens `n` pages, and waits until they have loaded. Every fifth is the page of the fleet, the
+    /// others are of the first experiment.
     pub async fn open(address: SocketAddr, n: usize) -> Self {
         let (close, mut closed) = watch::channel(false);
         let reader = thread::spawn(move || {

@@ -108,8 +108,7 @@ impl Control {
         &self,
         mut order: EvaluationOrder,
     ) -> Result<CheckedEvaluation, ControlError> {
-        // The order may wait long for its check, and a list that grew while it was read has spare
-        // capacity.
+        // Frees spare capacity, because the order may wait long for its check.
         order.genotype.shrink_to_fit();
         let place = self.requests.enter(order.len())?;
         self.requests.check(self.client, move |_| order.check(place)).await?

@@ -32,7 +32,7 @@ impl FitnessOrder {
     /// Bytes of memory that the order takes until its answer.
     fn len(&self) -> usize {
         let genes: usize = self.genotypes.iter().map(|genes| size_of_val(&**genes)).sum();
-        // Without genes, the lists alone take memory.
+        // Lists take memory even without genes.
         2 * self.config_json.len() + size_of_val(&*self.genotypes) + genes
     }
 
@@ -69,7 +69,7 @@ impl Control {
     /// Has the fleet compute the fitness of each genotype in every trial. Dropping the future
     /// tells the driver that the client has gone.
     pub async fn fitness(&self, mut order: FitnessOrder) -> Result<Vec<Vec<f64>>, ControlError> {
-        // Lists that grew while they were read have spare capacity.
+        // Frees the spare capacity of lists that grew while they were read.
         order.genotypes.iter_mut().for_each(Vec::shrink_to_fit);
         order.genotypes.shrink_to_fit();
         let _place = self.requests.enter(order.len())?;

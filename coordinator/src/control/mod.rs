@@ -86,8 +86,8 @@ pub enum ControlError {
     TooManyUnfinished,
     /// The limit of memory for requests is reached.
     #[error(
-        "experiment files and genotypes of {} MiB, as much as the coordinator takes at the \
-         same time, are being checked or wait to be evaluated; try again when some are done",
+        "requests in progress have {} MiB of experiment files and genotypes, as much as the \
+         coordinator accepts; try again when some are done",
         REQUESTS_LEN_MAX >> 20
     )]
     TooManyRequests,

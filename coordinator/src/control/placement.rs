@@ -34,9 +34,9 @@ pub enum Placement {
 /// How existing experiments may satisfy a submission.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Existing {
-    /// Whether an identical experiment that can continue may.
+    /// Whether an identical experiment that can continue satisfies it.
     pub resume_unfinished: bool,
-    /// Whether an identical experiment that has completed may.
+    /// Whether an identical experiment that has completed satisfies it.
     pub reuse: bool,
 }
 
@@ -86,7 +86,7 @@ fn place_beside(
     let (id, is_new) = store.create(new, clock::unix_ms())?;
     Ok(if is_new {
         let genotype_len = new.genotype_len as u64;
-        // The generations that a fork shares with its parent.
+        // A new fork has the generations that it shares with its parent.
         let latest = store.experiment(id)?.and_then(|stored| stored.record.latest);
         let runnable = Runnable::new(id, new.config.clone(), genotype_len, new.priority);
         Placement::Runs(Box::new(Runnable { latest, ..runnable }))

@@ -66,7 +66,7 @@ impl Requests {
         check: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
     ) -> Result<T, ControlError> {
         let turn = self.checks.wait(client).await;
-        // Ends with the coordinator, and when the client goes away.
+        // Cancelled when the coordinator stops, and when the client goes away.
         let end = self.shutdown.child_token();
         let ended_in_time = end.clone().drop_guard();
         let checking = task::spawn_blocking(move || {

@@ -33,7 +33,8 @@ impl Control {
         Ok(())
     }
 
-    /// Starts no unfinished experiment: [`Self::take_up`] starts one when a client requests it.
+    /// Starts no unfinished experiment: [`Self::take_up_if_left`] starts one when a client requests
+    /// it.
     pub async fn leave_unfinished(&self) -> Result<(), StoreError> {
         let unfinished = Filter::unfinished();
         let unfinished = self.store.read(move |store| store.experiments(&unfinished)).await?;

@@ -9,7 +9,7 @@ use crate::{ids::WorkerId, store::Store, submission::Submission};
 use super::*;
 
 #[tokio::test]
-async fn what_is_stored_runs_although_its_client_is_gone() {
+async fn a_stored_experiment_runs_although_its_client_has_gone() {
     let directory = tempfile::tempdir().unwrap();
     let store = SharedStore::new(Store::open(directory.path()).unwrap());
     // The channel to the driver is full.

@@ -88,8 +88,8 @@ impl Turns {
 impl Drop for Turn {
     fn drop(&mut self) {
         let Some(turns) = self.0.take() else { return };
-        // A client that has gone away returns the place; not as a `Turn`, whose drop would come
-        // here again.
+        // A client that has gone away returns the place. The loop empties its `Turn`, so that
+        // dropping it does not return the place again.
         loop {
             let Some(next) = turns.line().next() else { return };
             match next.send(Turn(Some(turns.clone()))) {
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn clients_take_turns_however_much_each_of_them_waits_for() {
+    fn clients_take_turns_however_many_requests_each_has() {
         let mut line = Line::new(1);
         assert!(line.take() && !line.take());
         (0..100).for_each(|number| line.wait(client(1), (1, number)));
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_place_is_passed_over_those_who_have_gone() {
+    async fn a_place_skips_clients_that_have_gone() {
         let turns = Turns::new(1);
         let first = turns.wait(client(1)).await;
         let mut gone = Box::pin(turns.wait(client(1)));

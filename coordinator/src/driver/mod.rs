@@ -66,8 +66,7 @@ pub struct Driver {
     evaluations: BTreeMap<EvaluationId, EvaluationReply>,
     tasks: JoinSet<Done>,
     questions: Questions,
-    /// Workers that enter or leave quarantine, in changes that are not stored yet; the first is
-    /// being written.
+    /// Changes of the quarantine that are not stored yet, in order; the first is being written.
     quarantine_changes: VecDeque<QuarantineChange>,
     /// Counts changes of the fleet.
     fleet_news: watch::Sender<u64>,

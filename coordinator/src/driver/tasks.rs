@@ -35,11 +35,11 @@ pub enum Done {
     QuarantineWritten,
     /// The coordinator stops before the change was stored.
     QuarantineNotWritten,
-    /// The write of a change has ended; whether the change was stored.
+    /// The write of a change has ended; the flag says whether the change was stored.
     ChangeWritten(ExperimentId, bool),
 }
 
-/// The store, and what tasks that use it share.
+/// The store, and the values that its tasks share.
 #[derive(Clone)]
 pub struct Disk {
     /// The store.
@@ -195,8 +195,8 @@ pub async fn write_quarantine(change: QuarantineWrite, disk: Disk) -> Done {
         QuarantineWrite::Add(worker) => store.quarantine(worker, now_ms),
         QuarantineWrite::Remove(name) => store.readmit(name),
     };
-    // If the coordinator stops before the write, a later fault reveals the worker again, and a
-    // client that readmits one gets no confirmation.
+    // If the coordinator stops before the write, a later fault reveals the faulty worker again, and
+    // a client gets no confirmation of a readmission.
     match disk.store.write(&disk.shutdown, &what, Retry::Always, write).await {
         Written::Yes => Done::QuarantineWritten,
         Written::NotWanted | Written::Never(_) => Done::QuarantineNotWritten,

@@ -14,7 +14,8 @@ use super::*;
 
 const ID: ExperimentId = ExperimentId(1);
 
-/// A driver with a database, one worker, and one experiment, submitted to both.
+/// A driver with a database, one worker, and one experiment, which the driver and the database
+/// have.
 struct Rig {
     driver: Driver,
     inbox: mpsc::Receiver<ToWorker>,

@@ -67,7 +67,7 @@ pub struct BatchActivity {
     pub n_episodes_left: usize,
     /// Items that no worker has.
     pub n_items_queued: usize,
-    /// Audits that no worker has. Each needs a worker with another name than the first.
+    /// Audits that no worker has. Each needs a worker whose name differs from the first worker's.
     pub n_audits_waiting: usize,
     /// Individuals that were in progress when their worker was lost, and that still have no
     /// result.

@@ -23,9 +23,9 @@ use super::{
 /// Most numbers per item of measures: half a MiB, because messages have a limited size.
 const VALUES_PER_ITEM: usize = 1 << 16;
 
-/// Individuals that the referee evaluates before a generation counts as one without finite
-/// fitness. One would do if a worker were honest and every genotype had a finite fitness. Some
-/// genotypes may have none, hence more than one.
+/// Number of individuals that the referee evaluates before a generation counts as one without
+/// finite fitness. A single individual proves little, because some genotypes may have no finite
+/// fitness although most have one.
 const WITHOUT_FITNESS_MIN: u32 = 8;
 
 /// Trials per item: all of them, unless their numbers exceed [`VALUES_PER_ITEM`].
@@ -39,7 +39,7 @@ fn trials_per_item(batch: &Batch) -> u32 {
     n_trials.max(1)
 }
 
-/// A worker that computes an item, which is not an audit.
+/// A worker that computes an item; audits do not count.
 #[derive(Debug, Clone)]
 struct Holder {
     assignment_id: AssignmentId,
@@ -206,7 +206,7 @@ impl BatchInProgress {
         self.unqueue(individual);
     }
 
-    /// Takes back [`Self::hold`]; whether it was in force.
+    /// Takes back [`Self::hold`]; returns whether the item was held.
     pub fn release(&mut self, item: &Item) -> bool {
         self.end_withholding(|held, until| held == item && until == Until::Answer).is_some()
     }
@@ -434,7 +434,7 @@ mod tests {
     use super::{ItemState::*, *};
 
     #[test]
-    fn of_the_states_that_apply_to_a_trial_the_last_counts() {
+    fn the_last_state_that_applies_to_a_trial_counts() {
         let now = Instant::now();
         let request = Batch::fitness(TrialSet::Generation(0), [vec![0.5]].into(), 2);
         let mut batch = BatchInProgress::new(request, now, FleetTime::new(now));

@@ -4,9 +4,9 @@
 //! virtual time. The engine splits an item by trial if slots would stay empty otherwise, and
 //! towards the end of a batch.
 //!
-//! Then, while slots are idle: the engine moves items to them that wait at a worker behind other
-//! items. It also gives idle slots copies of items in progress if they should finish sooner, or
-//! if the item is late, repeatedly if necessary. The first result wins.
+//! Then, while slots are idle, the engine moves items to them from workers with more items than
+//! slots. It also gives idle slots copies of items in progress, if a copy should finish sooner or
+//! an item is late, repeatedly if necessary. The first result wins.
 
 use std::{
     collections::BTreeMap,
@@ -26,15 +26,16 @@ use super::{
 
 /// Time lost by moving an item: a round trip, and the coordinator's own delays.
 const MOVING_COST: Duration = Duration::from_millis(20);
-/// Trials of a slot's share of a batch that are left to others: half a trial because shares are
-/// rounded down, and some because the remainders are calls of their own. Of values from 0 to 1.3,
-/// this one is best in `cargo bench -p coordinator --bench scaling`.
+/// Number of trials of its share of a batch that a slot loses to others. Half a trial is lost
+/// because shares are rounded down, the rest because a remainder is a call of its own. This value
+/// is the best of those from 0 to 1.3 in `cargo bench -p coordinator --bench scaling`.
 const LOST_PER_SLOT: f64 = 0.7;
 /// Number of workers to try if the first is not suitable.
 const N_LOOKED_AT: usize = 8;
 /// Time after which an item is late if no similar item has been computed yet.
 const UNKNOWN_LATE: Duration = Duration::from_secs(5);
-/// Copies per late copy of such an item. Copies may hang, too, so their number has to grow.
+/// Number of copies for each late copy of such an item. Copies may hang, too, so their number has
+/// to grow.
 const UNKNOWN_COPIES: usize = 2;
 
 impl Engine {
@@ -66,8 +67,8 @@ impl Engine {
     }
 
     /// The next item: its job, its queue, and the worker that gets it. While a job's next item
-    /// waits for a free slot, later jobs get only idle slots, which are those of workers that do
-    /// not take the job. Serving later jobs ahead would keep slots from becoming free.
+    /// waits for a free slot, later jobs get only idle slots, all of them at workers that do not
+    /// take the first job. If later jobs got items ahead, no slot would become free.
     fn next_item(&self) -> Option<(JobId, WorkerId, Source)> {
         if self.load_index.available.is_empty() {
             return None;
@@ -123,9 +124,9 @@ impl Engine {
         n_slots / self.ready_queue.len().max(1)
     }
 
-    /// Whether workers with full slots get a job's items, too. Not near the end of a batch, where
-    /// the first free worker should get the remaining items; unless items take no longer than a
-    /// round trip.
+    /// Whether workers with full slots get a job's items, too. Near the end of a batch they do not,
+    /// because the first free worker should get the remaining items; unless items take no longer
+    /// than a round trip.
     fn hands_out_ahead(&self, id: JobId) -> bool {
         let Some(batch) = self.batch(id) else { return false };
         let n_slots = self.n_slots_each(self.load_index.n_usable_slots);
@@ -155,9 +156,10 @@ impl Engine {
         n_trials.div_ceil(n_parts).min(share as usize).max(1)
     }
 
-    /// A worker's further share of the remaining trials of a batch, if the engine assigned all of
-    /// them now so that all workers finish together. The engine assigns short trials like this,
-    /// because a worker without trials waits for new ones as long as a trial takes.
+    /// A worker's further share of the remaining trials of a batch, in a schedule that assigns all
+    /// of them now and has all workers finish together. The engine assigns short trials in such
+    /// shares, because a worker that runs out of trials waits for new ones as long as a trial
+    /// takes.
     fn share_of_batch(&self, batch: &BatchInProgress, worker: &Worker) -> f64 {
         let n_slots = self.load_index.n_usable_slots as f64;
         let n_left = self.ready_queue.len().max(1) as f64 * batch.known.n_episodes_left() as f64;
@@ -327,8 +329,9 @@ struct Slow {
 }
 
 impl JobWork {
-    /// The assignment without a duplicate that should end last, or else the latest one, if idle
-    /// slots should finish it sooner. Jobs with queued items need no duplicates.
+    /// The assignment without a duplicate that should end last, or else the one that should have
+    /// ended first, if idle slots should finish it sooner. Jobs with queued items need no
+    /// duplicates.
     fn slowest(
         &self,
         now: Instant,
@@ -345,8 +348,8 @@ impl JobWork {
             let n_trials = item.trials.len();
             let n_parts = (n_idle_slots / batch.uncovered.len()).clamp(1, n_trials);
             let (needed, n_copies) = match self.expected(n_trials.div_ceil(n_parts), pace) {
-                // Half as much again, because a worker may finish an item that it was told to
-                // drop.
+                // Adds half of the time, because a worker may first finish an item that it was told
+                // to drop.
                 Some(needed) => (needed.mul_f64(1.5) + MOVING_COST, 1),
                 // The limit grows with the age of the batch.
                 None => (UNKNOWN_LATE.max(batch.running_for(now) / 2), UNKNOWN_COPIES),

@@ -88,9 +88,8 @@ impl WorkerTime {
         Self { n_slots, joined: now, busy: Duration::ZERO, previous: window, current: window }
     }
 
-    /// Counts a result. Returns the plausible part of `compute_time`: a worker's slots cannot
-    /// have computed for longer than they exist, nor an item for longer than since it was
-    /// `assigned`.
+    /// Counts a result. Returns the plausible part of `compute_time`: a worker's slots cannot have
+    /// computed for longer than they exist, nor for longer than the item has been `assigned`.
     pub fn add_result(
         &mut self,
         now: Instant,
@@ -146,7 +145,7 @@ mod tests {
     const SECOND: Duration = Duration::from_secs(1);
 
     #[test]
-    fn nobody_computes_for_longer_than_there_is_time() {
+    fn no_worker_computes_for_longer_than_it_exists() {
         let start = Instant::now();
         let mut time = WorkerTime::new(start, 2);
         let now = start + SECOND;

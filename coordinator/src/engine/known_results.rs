@@ -74,8 +74,8 @@ impl KnownResults {
         self.by(individual, trial) != NOBODY
     }
 
-    /// The name of the worker that computed a trial; none without a result, and for the
-    /// referee's.
+    /// The name of the worker that computed a trial; none without a result, and if the referee
+    /// computed it.
     pub fn name(&self, individual: u32, trial: u32) -> Option<&Arc<str>> {
         self.names.get(&self.by(individual, trial))
     }
@@ -85,7 +85,7 @@ impl KnownResults {
         self.names.values()
     }
 
-    /// Splits an item into parts that one worker computed each.
+    /// Splits an item into parts, each of which one worker computed.
     pub fn by_worker(&self, item: &Item) -> Vec<Item> {
         let individual = item.individual;
         let mut parts: Vec<Item> = Vec::new();

@@ -171,7 +171,8 @@ pub struct Assignment {
     pub trials: Range<u32>,
     /// The genotype.
     pub genotype: SharedGenotype,
-    /// Whether the worker draws it, from the latest distribution of the job that it was sent.
+    /// Whether the worker draws the genotype from the job's latest distribution, instead of
+    /// receiving it.
     pub is_drawn: bool,
 }
 

@@ -185,8 +185,8 @@ impl Engine {
         id
     }
 
-    /// Renews the virtual time of jobs that had to wait for this worker, so that they have saved
-    /// up no time.
+    /// Moves jobs that had to wait for this worker to the present virtual time, so that the wait
+    /// gives them no advantage.
     fn take_up_stranded(&mut self, joining: &Worker) {
         if self.workers.is_empty() {
             return;
@@ -319,7 +319,7 @@ impl Engine {
         self.workers.values().any(Worker::is_usable)
     }
 
-    /// Ends the rest of workers that have rested long enough, or that are the only ones.
+    /// Wakes workers that have rested long enough, or that are the only ones.
     fn wake_rested(&mut self, now: Instant) {
         let is_needed = !self.has_usable_worker();
         let resting = self.workers.iter().filter(|(_, worker)| {
@@ -428,24 +428,24 @@ impl Engine {
         self.update_readiness(id);
     }
 
-    /// The batch of a job in progress.
+    /// A job's batch in progress.
     fn batch(&self, id: JobId) -> Option<&BatchInProgress> {
         self.jobs.get(&id)?.batch.as_ref()
     }
 
-    /// The batch of a job in progress.
+    /// A job's batch in progress.
     fn batch_mut(&mut self, id: JobId) -> Option<&mut BatchInProgress> {
         self.jobs.get_mut(&id)?.batch.as_mut()
     }
 
-    /// The batch of a job in progress, if it has this trial set; otherwise the batch of that
-    /// trial set has ended.
+    /// A job's batch in progress, if it has this trial set; otherwise the batch with this trial
+    /// set has ended.
     fn batch_with(&self, id: JobId, trial_set: TrialSet) -> Option<&BatchInProgress> {
         self.batch(id).filter(|batch| batch.request.trial_set == trial_set)
     }
 
-    /// The batch of a job in progress, if it has this trial set; otherwise the batch of that
-    /// trial set has ended.
+    /// A job's batch in progress, if it has this trial set; otherwise the batch with this trial
+    /// set has ended.
     fn batch_with_mut(&mut self, id: JobId, trial_set: TrialSet) -> Option<&mut BatchInProgress> {
         self.batch_mut(id).filter(|batch| batch.request.trial_set == trial_set)
     }

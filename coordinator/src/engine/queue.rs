@@ -63,9 +63,9 @@ impl Queue {
         Some(item)
     }
 
-    /// Like [`Self::pop_front`], but remainders wait until no item of `whole` trials is first;
-    /// then the last remainder comes first. A worker that gets whole items then does not get them
-    /// in pieces, each a call of its own.
+    /// Like [`Self::pop_front`], but remainders wait while an item of `whole` trials is at the
+    /// front. Then the last remainder goes first. So a worker gets whole items, and not pieces that
+    /// are each a call of its own.
     pub fn pop_whole_first(&mut self, n_trials: usize, whole: usize) -> Option<Item> {
         let is_whole = self.items.front()?.trials.len() == whole;
         let item = if is_whole { self.items.pop_front() } else { self.items.pop_back() }?;
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_items_go_before_rests_and_of_these_the_last_goes_first() {
+    fn whole_items_go_before_remainders_and_the_last_remainder_goes_first() {
         let mut queue = queue();
         let mut pop = |n_trials| queue.pop_whole_first(n_trials, 5);
         assert_eq!([pop(4), pop(5)], [Some(item(0, 0..4)), Some(item(1, 0..5))]);

@@ -64,7 +64,7 @@ impl Engine {
         }
     }
 
-    /// Why a correct worker cannot return this result for an assignment, if so.
+    /// Why no correct worker returns this result for an assignment; `None` if one might.
     fn impossibility(&self, assignment: &AssignedItem, result: &ItemResult) -> Option<String> {
         let batch = self.batch(assignment.job)?;
         let values = result.outcome.as_ref().ok()?;

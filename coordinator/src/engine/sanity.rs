@@ -36,14 +36,17 @@ impl Engine {
         assert_eq!(load_index.usable_speed, self.load_index.usable_speed);
         for (&id, work) in &self.jobs {
             let in_flight = in_flight.remove(&id).unwrap_or_default();
-            assert!(!work.is_paused || in_flight.is_empty(), "paused work is nobody's");
+            assert!(
+                !work.is_paused || in_flight.is_empty(),
+                "no worker has an item of a paused job"
+            );
             assert_eq!(self.ready_queue.has(id, work), work.is_ready());
             match &work.batch {
                 Some(batch) => batch.sanity_check(&in_flight),
                 None => assert!(in_flight.is_empty()),
             }
         }
-        assert!(in_flight.is_empty(), "nobody computes for a job that is over");
+        assert!(in_flight.is_empty(), "no worker has an item of an ended job");
         let n_ready = self.jobs.values().filter(|work| work.is_ready()).count();
         assert_eq!(self.ready_queue.len(), n_ready);
         let has_queued = |work: &&JobWork| {

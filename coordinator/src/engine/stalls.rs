@@ -9,7 +9,7 @@ use super::{Engine, results::NoResult, worker::Worker};
 /// A worker is stalled if its oldest item takes this many times its expected duration, plus this
 /// time.
 const PATIENCE: (u32, Duration) = (4, Duration::from_secs(1));
-/// The same for an audit that no other worker can do, and that the engine would have to waive.
+/// The same for an audit that no other worker can do. The engine would have to waive it.
 const PATIENCE_WITH_AUDITOR: (u32, Duration) = (40, Duration::from_secs(10));
 
 impl Engine {

@@ -21,8 +21,7 @@ pub struct Counters {
     pub n_items_computed: u64,
     /// Items that a worker could not compute.
     pub n_items_failed: u64,
-    /// Items without a result that workers returned, or that were taken from a lost or distrusted
-    /// worker.
+    /// Items given to another worker because the first one failed, was lost or is in doubt.
     pub n_items_requeued: u64,
     /// Items taken back from a worker because another has the result, or a free slot.
     pub n_items_recalled: u64,

@@ -42,8 +42,7 @@ pub struct Worker {
     pub obstacles: Obstacles,
     /// Time of its last result.
     pub last_result: Option<Instant>,
-    /// Jobs whose specification it has, each with the trial set of the batch whose
-    /// distribution it has.
+    /// Jobs whose specification it has, each with the trial set of its latest distribution, if any.
     pub known_jobs: BTreeMap<JobId, Option<TrialSet>>,
     /// Its assignments without a result, oldest first because ids grow.
     pub in_flight: InFlight,

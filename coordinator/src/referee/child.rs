@@ -49,8 +49,8 @@ pub fn serve_stdio() -> io::Result<()> {
             }
         }
     })?;
-    // The stack has the size of a worker's slots, not of a main thread, so that too deep a
-    // recursion fails in both.
+    // A slot of a worker has a stack of this size, unlike a main thread. So too deep a recursion
+    // fails in both programs.
     let computing = thread::Builder::new()
         .name("slot-0".into())
         .spawn(move || answer(&requests, &mut io::stdout(), &is_over))?;

@@ -64,8 +64,8 @@ impl Process {
         let mut command = Command::new(&program.path);
         command.args(&program.args);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        // Removes the coordinator's settings: some are secrets, and an invalid one that an option
-        // replaces would keep the process from starting.
+        // Removes the coordinator's variables. Some are secrets, and an invalid one would keep the
+        // process from starting, even if an option of the coordinator replaces it.
         for (variable, _) in env::vars_os() {
             if variable.to_string_lossy().starts_with("SWARM_") {
                 command.env_remove(variable);
@@ -168,7 +168,7 @@ impl Process {
     }
 
     /// The messages that request an item. They include its specification if the process lacks it;
-    /// it replaces the least recently used one.
+    /// the process then forgets the least recently used specification.
     fn messages(&mut self, request: &RefereeRequest) -> Vec<u8> {
         let RefereeRequest { specification, genotype, trial_set, trials, output } = request;
         let mut bytes = Vec::new();

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messages_come_out_as_they_went_in_however_they_are_cut_and_bits_stay() {
+    fn messages_arrive_unchanged_however_the_stream_is_cut() {
         let sent = TrialMeasures { values: vec![0.1, -0.0, f64::NAN, f64::from_bits(1), 0.5] };
         let bits =
             |sent: &TrialMeasures| sent.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_message_is_refused() {
+    fn invalid_bytes_are_refused() {
         for bytes in [&[1, 255][..], &[255; 12], &[255, 255, 255, 127, 0]] {
             let refused = Arrived(bytes.to_vec()).take::<TrialMeasures>().unwrap_err();
             assert_eq!(refused.kind(), io::ErrorKind::InvalidData, "{bytes:?}");

@@ -93,7 +93,7 @@ async fn a_watcher_that_does_not_read_is_told_where_to_resume_and_misses_nothing
     assert_eq!(status.code(), Code::Aborted);
     let next = seen.last().unwrap() + 1;
     assert!(status.message().ends_with(&format!("resume from sequence {next}")), "{status}");
-    assert_eq!(seen.len(), WATCH_QUEUE_LEN, "no more waits for it");
+    assert_eq!(seen.len(), WATCH_QUEUE_LEN, "no further event waits for it");
 
     let (rest, status) = read(&service, next, Duration::ZERO).await;
     assert!(status.is_none());
@@ -110,7 +110,7 @@ async fn a_watcher_that_pauses_is_not_dropped() {
 }
 
 #[tokio::test]
-async fn a_list_has_what_is_wanted_page_by_page() {
+async fn a_list_has_the_wanted_experiments_page_by_page() {
     let directory = tempfile::tempdir().unwrap();
     let service = service(&directory).await;
     let request = SubmitExperimentRequest {

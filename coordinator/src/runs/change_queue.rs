@@ -11,8 +11,8 @@ use crate::{
 
 use super::RequestId;
 
-/// Changes that are being written or wait. Their number is bounded by that of requests, because
-/// each client waits for its own.
+/// Changes that are being written or wait. The number of requests bounds them, because each client
+/// waits for its own change.
 #[derive(Debug, Default)]
 pub struct ChangeQueue {
     /// A queue per experiment, none empty; the first change is being written.

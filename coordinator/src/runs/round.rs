@@ -177,9 +177,9 @@ impl UpdatedEvolution {
         self.evolution.n_generations().is_multiple_of(config.algorithm.champion_every)
     }
 
-    /// `with_champion`: evolution after a re-evaluation. A longer run does not continue from an
-    /// extra re-evaluation at the end: later generations must have the same bits as in a run of
-    /// that length from the beginning.
+    /// `with_champion`: evolution after a re-evaluation. An extended run does not continue from the
+    /// extra re-evaluation at the former end, because its later generations must have the bits of a
+    /// run that had all these generations from the beginning.
     fn into_ready(self, with_champion: Option<Evolution>) -> ReadyToCommit {
         let Self { evolution, generation, told, notices, completed } = self;
         let digest = match &with_champion {

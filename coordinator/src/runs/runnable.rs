@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn what_contradicts_itself_is_not_run() {
+    fn contradictory_stored_values_are_not_run() {
         let (sound, checkpoint) = stored();
         Runnable::restore(&sound, &checkpoint).unwrap();
 

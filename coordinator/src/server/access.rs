@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_network_needs_tokens_and_tls_or_the_word_that_it_is_private() {
+    fn a_network_needs_tokens_and_tls_or_the_option_plaintext() {
         for listen in ["0.0.0.0:7700", "[::]:7700", "10.0.0.1:7700", "[::ffff:10.0.0.1]:1"] {
             let nothing = Access { plaintext: true, ..Access::default() };
             assert!(matches!(check(listen, &nothing), Err(AccessError::NoTokens(_))), "{listen}");

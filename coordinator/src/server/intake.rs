@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn whoever_sends_a_long_message_slowly_is_ended() {
+    async fn a_call_that_sends_a_long_message_slowly_is_ended() {
         let intake = Intake::default();
         let (mut slow, sender) = body(&intake, &[], 1);
         sender.send(Bytes::from_static(b"\0\0\x10\0\0")).await.unwrap();

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn what_nobody_reads_is_dropped_and_its_room_is_free() {
+    async fn an_answer_that_nobody_reads_is_dropped_and_its_room_is_free() {
         let outflow = Outflow::default();
         let mut body = answer(&outflow, 1_000_000);
         assert_eq!(piece(&mut body).await.unwrap(), PIECE_LEN);

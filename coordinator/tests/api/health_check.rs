@@ -61,7 +61,7 @@ async fn a_coordinator_is_healthy_wherever_it_listens_with_tls_and_without() {
 }
 
 #[tokio::test]
-async fn one_that_is_asked_in_another_way_than_it_serves_is_not_healthy() {
+async fn a_check_with_other_tls_than_the_coordinators_fails() {
     let (own, other) = (tls(true), tls(false));
     let data = tempfile::tempdir().unwrap();
     let coordinator = start("127.0.0.1:0", &data, Some(&own)).await.unwrap();
@@ -90,7 +90,7 @@ async fn one_that_is_asked_in_another_way_than_it_serves_is_not_healthy() {
 }
 
 #[tokio::test]
-async fn one_that_does_not_answer_is_not_healthy() {
+async fn a_coordinator_that_does_not_answer_is_not_healthy() {
     let silent = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let error = health_check(silent.local_addr().unwrap(), None).await.unwrap_err();
     assert!(matches!(error, Unhealthy::Silent { .. }), "{error}");

@@ -143,8 +143,8 @@ fn run_process(input: &[u8]) -> Ended {
 #[tokio::test]
 async fn values_are_those_of_the_simulation_to_the_bit() {
     let referee = Referee::new(coordinator(), LONG);
-    // More experiments than the process keeps compiled, twice, in an order in which it still has
-    // some of them.
+    // These are more experiments than the process keeps compiled. When they come again, it still
+    // has some of them.
     for seed in [0, 1, 2, 3, 4, 5, 0, 5, 3, 4, 1, 1] {
         let config = config(|config| config.seed = seed);
         let simulation = Simulation::compile(&config).unwrap();
@@ -177,7 +177,7 @@ async fn values_are_those_of_the_simulation_to_the_bit() {
 }
 
 #[tokio::test]
-async fn failures_have_their_words() {
+async fn failures_have_the_simulations_messages() {
     let referee = Referee::new(coordinator(), LONG);
     let failure = async |request: RefereeRequest| match referee.evaluate(&request).await {
         Verdict::Failed(failure) => failure,
@@ -228,7 +228,7 @@ async fn a_process_that_is_killed_while_it_computes_has_died_and_the_next_item_i
 }
 
 #[tokio::test]
-async fn an_item_that_takes_every_process_down_does_so_here_and_others_do_not() {
+async fn an_item_that_takes_every_process_down_has_that_verdict_and_others_have_values() {
     // Poison: the system kills any process that computes for longer than a second.
     let referee = Referee::new(shell("ulimit -t 1; exec $0 referee"), LONG);
     let poison = endless();
@@ -256,7 +256,7 @@ async fn an_item_is_not_to_blame_for_a_process_that_is_told_to_stop_or_dies_with
             matches!(&verdict, Verdict::Unavailable(why) if why.contains("told to stop")),
             "{verdict:?}"
         );
-        // So that the next one's process id is not mistaken for this one's.
+        // Otherwise the test would take this process for the next one.
         fs::remove_file(pid_file(traced.directory.path())).unwrap();
     }
 }
@@ -266,7 +266,7 @@ async fn a_process_without_items_ends_after_its_time() {
     let traced = Traced::new(Duration::from_millis(300));
     let mut ids = Vec::new();
     for _ in 0..2 {
-        // Within its idle time.
+        // These items come within its idle time.
         for _ in 0..3 {
             assert!(matches!(traced.referee.evaluate(&short()).await, Verdict::Values(_)));
             ids.push(traced.process_id().unwrap());
@@ -279,7 +279,7 @@ async fn a_process_without_items_ends_after_its_time() {
 }
 
 #[tokio::test]
-async fn who_stops_waiting_ends_the_computation() {
+async fn a_caller_that_stops_waiting_ends_the_computation() {
     let traced = Traced::new(LONG);
     let item = endless();
     let id = tokio::select! {

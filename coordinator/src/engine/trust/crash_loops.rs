@@ -47,7 +47,7 @@ impl CrashLoops {
 
     /// A worker has returned a result.
     pub fn on_result(&mut self, worker: &Worker) {
-        // Fast, because it runs for every result: few workers have an entry.
+        // Checks the flag first, because this runs for every result and few workers have an entry.
         if worker.obstacles.is_on_probation {
             self.by_name.remove(worker.name());
         }

@@ -47,8 +47,8 @@ pub use self::{
     unaudited::Unaudited,
 };
 
-/// Time that an audit waits for a second worker to connect or reconnect. Without this wait, a
-/// lying worker would only have to connect first after the coordinator's start.
+/// Time that an audit waits for a second worker to connect or reconnect. Without this wait, a lying
+/// worker could escape audits by being the first to connect after the coordinator's start.
 const AUDITOR_GRACE: Duration = Duration::from_secs(30);
 
 /// The state of everything that concerns the workers' reliability.
@@ -85,8 +85,8 @@ impl Trust {
 }
 
 impl Engine {
-    /// The worker for the next check of a job's batch: an audit of values whose worker is not in
-    /// doubt already, or a suspect, one at a time.
+    /// The next check of a job's batch, and the worker for it. A check is an audit of a worker that
+    /// is not in doubt already, or a suspect; a worker gets one suspect at a time.
     pub(super) fn next_check(
         &self,
         work: &JobWork,

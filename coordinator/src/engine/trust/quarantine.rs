@@ -4,7 +4,8 @@ use std::{collections::BTreeMap, num::NonZeroU64};
 
 use super::super::Introduction;
 
-/// Most names in quarantine; further faulty workers get nothing only until they reconnect.
+/// Most names in quarantine. Beyond them, a faulty worker gets nothing until it reconnects, and
+/// then items again.
 const N_MAX: usize = 4096;
 
 /// The faulty workers, by name, because a restarted worker still runs on the same machine.

@@ -22,7 +22,7 @@ use super::super::{Command, OpenQuestion, batch::name_of, item::Item, known_resu
 /// Number of processes that an item must take down before it is to blame. A single death may have
 /// another cause, such as a system that is short of memory.
 const N_DEATHS: u32 = 3;
-/// Time between these attempts, by which other causes have passed.
+/// Time between these attempts, in which other causes should pass.
 const DEATH_DELAY: Duration = Duration::from_secs(5);
 /// Time before another attempt if the referee could not answer; doubles with each attempt.
 const FIRST_DELAY: Duration = Duration::from_secs(1);
@@ -144,8 +144,8 @@ impl Question {
         OpenQuestion { individual: self.item.individual, doubt, trouble: self.trouble.clone() }
     }
 
-    /// Whether its item is withheld from workers until the answer. Not if workers have computed
-    /// the item, and not while the referee cannot answer.
+    /// Whether its item is withheld from workers until the answer. An item that workers have
+    /// computed is not withheld, nor is any while the referee cannot answer.
     pub fn holds(&self) -> bool {
         matches!(self.doubt, Doubt::Failure { .. } | Doubt::Losses) && self.trouble.is_none()
     }

@@ -1,4 +1,4 @@
-//! Records since which generation no audit has confirmed a worker's results.
+//! Records the generations in which no audit has confirmed a worker's results.
 
 use std::{collections::BTreeMap, ops::RangeInclusive, sync::Arc};
 

@@ -86,9 +86,9 @@ impl Engine {
         self.commands.extend(self.trust.questions.asked_again(now));
     }
 
-    /// Whether other workers confirm a reported failure in the same words, while the referee
-    /// cannot answer. It takes workers with most of the slots, because fewer may be faulty, and
-    /// at least two names.
+    /// Whether other workers confirm a reported failure in the same words, while the referee cannot
+    /// answer. A confirmation needs workers with most of the slots, because fewer may be faulty,
+    /// and at least two names.
     pub(in crate::engine) fn confirms(
         &self,
         job: JobId,
@@ -269,7 +269,7 @@ impl Engine {
                 let (first, last) = generations.into_inner();
                 work.notices.push(format!(
                     "worker \"{name}\" is faulty, and no audit has agreed with it in generations \
-                     {first} to {last}: what it computed for them may be wrong"
+                     {first} to {last}: its results there may be wrong"
                 ));
             }
             if let Some(batch) = &mut work.batch {

@@ -49,7 +49,7 @@ fn a_run_that_chance_drives_out_of_all_bounds_fails_with_the_reason() {
 }
 
 #[test]
-fn trials_within_the_smallest_numbers_are_judged() {
+fn a_champion_with_the_smallest_numbers_as_fitness_is_judged() {
     let (notices, _) = run("SNES", 2, |i| [0.0, 5e-324, 1e-323][i % 3]);
     assert!(notices.iter().any(|notice| notice.starts_with("champion judged: ")), "{notices:?}");
 }

@@ -27,7 +27,7 @@ fn finish_rounds(world: &mut World, id: ExperimentId, n_rounds: usize) {
 }
 
 #[test]
-fn the_champion_is_judged_after_the_last_generation_and_before_that_is_stored() {
+fn the_champion_is_judged_after_the_last_generation_and_before_its_commit() {
     let mut world = World::new();
     let id = world.submit(2);
     world.finish_load(0);
@@ -46,8 +46,16 @@ fn the_champion_is_judged_after_the_last_generation_and_before_that_is_stored() 
     finish_rounds(&mut world, id, 1);
     assert_eq!(judged(&world).map(|judged| (judged.n_trials, judged.generation)), Some((3, 1)));
     let ready = &world.commits[0].ready;
-    assert_ne!(ready.digest, ready.evolution.champion_digest().to_string(), "it has a link");
-    assert_eq!(ready.evolution.champion().unwrap().judged, None, "evolution does not know it");
+    assert_ne!(
+        ready.digest,
+        ready.evolution.champion_digest().to_string(),
+        "the judgement has a link"
+    );
+    assert_eq!(
+        ready.evolution.champion().unwrap().judged,
+        None,
+        "evolution does not know the judgement"
+    );
     world.settle();
     world.check_settled();
 }
@@ -94,7 +102,7 @@ fn a_generation_is_evaluated_while_the_one_before_is_stored() {
 }
 
 #[test]
-fn what_is_being_stored_when_an_experiment_is_cancelled_is_stored_first() {
+fn a_commit_in_progress_comes_before_the_end_of_a_cancelled_run() {
     let (mut world, id) = committing();
     let request = world.request(id, Request::Cancel);
     assert!(world.jobs.is_empty(), "the fleet drops it at once");
@@ -110,7 +118,7 @@ fn what_is_being_stored_when_an_experiment_is_cancelled_is_stored_first() {
 }
 
 #[test]
-fn conclusions_that_come_after_the_end_are_not_heeded() {
+fn conclusions_after_the_end_are_ignored() {
     let (mut world, id) = committing();
     world.finish_batch(id);
     world.request(id, Request::Cancel);

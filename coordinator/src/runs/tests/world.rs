@@ -123,7 +123,7 @@ pub fn undisturbed(config: &ExperimentConfig, n_generations: u64) -> Evolution {
 }
 
 fn experiment(job: JobId) -> ExperimentId {
-    job.experiment().expect("nobody wants an evaluation")
+    job.experiment().expect("no test requests an evaluation")
 }
 
 impl World {
@@ -156,8 +156,7 @@ impl World {
         id
     }
 
-    /// A client asks for more generations of a completed experiment, or takes back the end of
-    /// another one.
+    /// A client extends a completed experiment, or resumes one that failed or was cancelled.
     pub fn reopen(&mut self, id: ExperimentId) {
         let stored = self.store.get_mut(&id).unwrap();
         assert!(!stored.state.is_unfinished());
@@ -378,13 +377,16 @@ impl World {
             if let Some(job) = self.jobs.get(id) {
                 assert_eq!(is_paused, job.is_paused);
                 let is_waiting = self.runs.runs[id].is_waiting();
-                assert!(is_paused || is_waiting, "what could go on has gone on");
-                assert!(!is_waiting || self.n_loaded() == 2, "what could be loaded is");
+                assert!(is_paused || is_waiting, "no run that can continue has stopped");
+                assert!(
+                    !is_waiting || self.n_loaded() == 2,
+                    "runs wait only if the memory is full"
+                );
             }
             assert_eq!(
                 stored.evolution,
                 undisturbed(&stored.config, stored.n_done()),
-                "whatever has happened, experiment {id} is where it would be otherwise"
+                "experiment {id} has the state of an undisturbed run"
             );
         }
     }
@@ -446,7 +448,7 @@ impl World {
                     let busy = |task: &CommitTask| task.outcome.is_none();
                     let mut commits = self.commits.iter().filter(|task| busy(task));
                     let is_first = !commits.any(|task| task.run.experiment == id);
-                    assert!(is_first, "what is being stored comes first");
+                    assert!(is_first, "a commit in progress comes first");
                     assert!(!self.jobs.contains_key(&id), "the fleet has dropped it");
                 }
                 self.changes.push(ChangeTask { experiment: id, change, outcome: None });
@@ -459,7 +461,7 @@ impl World {
                 assert!(self.runs.runs[&experiment].is_waiting());
             }
             Command::PublishEnd { state, .. } => assert!(!state.is_unfinished()),
-            Command::AnswerEvaluation { .. } => unreachable!("nobody wants an evaluation"),
+            Command::AnswerEvaluation { .. } => unreachable!("no test requests an evaluation"),
         }
     }
 }

@@ -52,7 +52,7 @@ fn a_worker_is_sent_a_distribution_once_per_generation_and_draws_from_it() {
 }
 
 #[test]
-fn where_they_are_shorter_than_the_distribution_genotypes_are_sent() {
+fn genotypes_are_sent_if_they_are_shorter_than_the_distribution() {
     let mut fleet = plain_fleet();
     for _ in 0..10 {
         fleet.join_by_hand(1);
@@ -64,7 +64,7 @@ fn where_they_are_shorter_than_the_distribution_genotypes_are_sent() {
 }
 
 #[test]
-fn audits_are_sent_genotypes_so_that_they_compare_both_ways() {
+fn audits_get_genotypes_so_that_both_ways_are_compared() {
     let mut fleet = auditing_fleet(1.0);
     fleet.join_by_hand(1);
     fleet.join_by_hand(1);
@@ -161,7 +161,7 @@ fn experiments_take_turns() {
 }
 
 #[test]
-fn activity_says_who_holds_what_since_when() {
+fn activity_names_the_items_of_each_worker_with_their_age() {
     let mut fleet = plain_fleet();
     let other = JobId::Experiment(ExperimentId(2));
     start(&mut fleet, EXPERIMENT, 5, 2);

@@ -41,7 +41,7 @@ fn a_worker_computes_no_experiment_whose_name_it_does_not_take() {
 }
 
 #[test]
-fn an_experiment_that_nobody_takes_holds_nobody_up_and_says_so() {
+fn an_experiment_that_no_worker_takes_holds_up_no_other_and_says_so() {
     let mut fleet = fleet();
     fleet.join_for("experiment-2", 1.0);
     for number in [1, 2] {
@@ -61,7 +61,7 @@ fn an_experiment_that_nobody_takes_holds_nobody_up_and_says_so() {
 }
 
 #[test]
-fn who_waited_for_a_worker_has_saved_up_no_time() {
+fn a_job_that_waited_for_a_worker_has_saved_up_no_time() {
     let mut fleet = fleet();
     let reserved = fleet.join_for("experiment-2", 1.0);
     for number in [1, 2] {
@@ -97,8 +97,8 @@ fn an_audit_that_no_second_worker_may_do_is_waived() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// With any patterns of workers: an experiment that a worker takes is completed to the same
-    /// values, and only by workers that take it.
+    /// Whatever the patterns of workers, every experiment that a worker takes is completed to the
+    /// same values, and only by workers that take it.
     #[test]
     fn every_experiment_that_somebody_takes_is_completed(
         patterns in prop::collection::vec("(\\*|experiment-[1-3?])", 1..6),

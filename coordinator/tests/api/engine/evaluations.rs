@@ -1,4 +1,4 @@
-//! Evaluations: generations of one, whose trials give many numbers.
+//! Evaluations: batches of one genotype, whose trials give many numbers.
 
 use std::ops::Range;
 
@@ -36,7 +36,7 @@ fn measure(fleet: &mut SimulatedFleet, id: WorkerId) -> bool {
 }
 
 #[test]
-fn an_evaluation_is_a_generation_of_one_whose_trials_have_many_numbers() {
+fn an_evaluation_has_one_genotype_and_many_numbers_per_trial() {
     let mut fleet = fleet();
     evaluate(&mut fleet, 200);
     let [first, second, victim] = [1, 2, 1].map(|n_slots| fleet.join_by_hand(n_slots));
@@ -66,7 +66,7 @@ fn a_worker_that_returns_too_few_or_too_many_measures_gets_nothing_more() {
 }
 
 #[test]
-fn measures_where_fitness_is_due_and_fitness_where_measures_are_are_proof_enough() {
+fn a_result_of_the_wrong_kind_is_proof_enough() {
     for is_evaluation in [true, false] {
         let mut fleet = fleet();
         if is_evaluation {

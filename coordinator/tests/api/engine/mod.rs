@@ -278,12 +278,12 @@ fn audits_are_waived_when_there_is_no_second_worker() {
     fleet.ask(EXPERIMENT, 0, 5, 1);
     assert!(fleet.run_until(HOUR, is_finished));
     assert_eq!(fleet.evaluated[0].1.n_unaudited, 5);
-    assert!(fleet.now() >= 30 * SECOND, "a second one may be about to come");
+    assert!(fleet.now() >= 30 * SECOND, "the audits wait for a second worker");
     // A second worker, which leaves in the middle of the batch.
     let second = fleet.join(1, 0.1);
     fleet.ask(EXPERIMENT, 1, 5, 1);
     fleet.run_for(2 * SECOND);
-    assert_eq!(fleet.evaluated.len(), 1, "it is waited for");
+    assert_eq!(fleet.evaluated.len(), 1, "the batch waits for the second worker");
     fleet.kill(second);
     assert!(fleet.run_until(HOUR, |fleet| fleet.evaluated.len() == 2));
     assert_right(&fleet, 5, 1);

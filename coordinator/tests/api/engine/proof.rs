@@ -33,7 +33,7 @@ fn silence_and_goodbyes_are_no_evidence_against_items() {
 }
 
 #[test]
-fn an_item_that_takes_its_workers_down_is_asked_of_the_referee_and_is_given_to_nobody_meanwhile() {
+fn the_referee_computes_an_item_that_takes_workers_down_and_no_worker_gets_it_meanwhile() {
     let mut fleet = plain_fleet();
     start(&mut fleet, EXPERIMENT, 1, 1);
     let mut id = fleet.join_by_hand(1);
@@ -204,7 +204,7 @@ fn find_no_fitness(fleet: &mut SimulatedFleet, id: WorkerId) {
 }
 
 #[test]
-fn a_generation_without_finite_fitness_is_not_believed_of_a_worker() {
+fn a_worker_is_not_believed_that_no_individual_has_a_finite_fitness() {
     let mut fleet = fleet();
     let liar = fleet.join_by_hand(2);
     start(&mut fleet, EXPERIMENT, 20, 2);
@@ -218,7 +218,7 @@ fn a_generation_without_finite_fitness_is_not_believed_of_a_worker() {
 }
 
 #[test]
-fn a_generation_without_finite_fitness_is_believed_of_the_referee() {
+fn the_referee_is_believed_that_no_individual_has_a_finite_fitness() {
     let mut fleet = fleet();
     fleet.has_no_fitness = true;
     let id = fleet.join_by_hand(2);
@@ -250,7 +250,7 @@ fn failures_of_the_same_individual_in_two_generations_do_not_confirm_each_other(
 }
 
 #[test]
-fn without_a_referee_work_goes_on_and_its_answer_is_waited_for() {
+fn without_a_referee_work_goes_on_and_the_question_stays_open() {
     let mut fleet = fleet();
     fleet.has_referee = false;
     let (liar, honest) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
@@ -321,7 +321,7 @@ fn a_late_result_that_differs_is_settled_by_the_referee() {
 }
 
 #[test]
-fn what_a_liar_computed_first_is_computed_again() {
+fn results_of_a_liar_are_computed_again() {
     let config = EngineConfig { audit_fraction: 1.0, ..EngineConfig::new(LEASE) };
     let mut fleet = SimulatedFleet::new(MODEL, config);
     let (liar, honest) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
@@ -369,7 +369,7 @@ fn a_worker_that_comes_back_after_a_loss_is_given_one_item_until_it_returns_some
     start(&mut fleet, EXPERIMENT, 40, 1);
     assert!(fleet.held(id).len() > 1);
     let id = fleet.restart(id).unwrap();
-    assert!(fleet.held(id).is_empty(), "it waits, as another can compute");
+    assert!(fleet.held(id).is_empty(), "it waits, because another worker can compute");
     fleet.run_for(SECOND);
     assert_eq!(fleet.held(id).len(), 1);
     fleet.step(id);
@@ -392,7 +392,7 @@ fn a_worker_in_quarantine_is_promised_no_item() {
 }
 
 #[test]
-fn a_worker_that_finishes_nothing_while_others_do_gets_nothing_until_it_does() {
+fn a_worker_without_results_gets_nothing_until_it_returns_one() {
     let mut fleet = fleet();
     let (hung, other) = (fleet.join_by_hand(4), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 100, 1);
@@ -403,7 +403,7 @@ fn a_worker_that_finishes_nothing_while_others_do_gets_nothing_until_it_does() {
     }
     let status = fleet.status();
     assert!(status[0].waits.is_some() && status[1].waits.is_none(), "{status:?}");
-    assert_eq!(status[0].n_in_flight, 0, "others do what it has");
+    assert_eq!(status[0].n_in_flight, 0, "other workers have its items");
     fleet.answer(hung, late.id, Ok(vec![fitness(&late.genotype, 0)]));
     assert!(fleet.status()[0].waits.is_none());
     assert!(fleet.status()[0].n_in_flight > 0);
@@ -412,7 +412,7 @@ fn a_worker_that_finishes_nothing_while_others_do_gets_nothing_until_it_does() {
 }
 
 #[test]
-fn a_stalled_worker_is_served_again_when_what_it_had_is_not_wanted_any_more() {
+fn a_stalled_worker_is_served_again_when_its_items_are_no_longer_needed() {
     let mut fleet = fleet();
     let (hung, other) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 100, 1);

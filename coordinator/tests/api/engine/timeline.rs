@@ -23,7 +23,7 @@ fn fates(fleet: &SimulatedFleet) -> BTreeMap<&'static str, usize> {
 }
 
 #[test]
-fn it_says_which_worker_computed_what_and_for_how_long() {
+fn it_names_the_worker_and_the_duration_of_every_item() {
     let mut fleet = fleet();
     let id = fleet.join(1, 1.0);
     fleet.submit(EXPERIMENT, 100);

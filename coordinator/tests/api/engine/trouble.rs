@@ -195,7 +195,7 @@ fn a_failing_worker_beside_an_honest_one_fails_no_experiment() {
 }
 
 #[test]
-fn one_worker_that_is_killed_more_often_than_it_can_finish_an_item_gets_there() {
+fn a_worker_that_is_killed_before_most_items_end_finishes_a_batch() {
     let model = FleetModel { trial: 2 * SECOND, ..MODEL };
     let mut fleet = SimulatedFleet::new(model, EngineConfig::new(LEASE));
     let mut id = fleet.join(2, 1.0);
@@ -205,7 +205,7 @@ fn one_worker_that_is_killed_more_often_than_it_can_finish_an_item_gets_there() 
         fleet.run_for(3 * SECOND / 2);
         id = fleet.restart(id).unwrap();
         assert!(fleet.failed.is_empty(), "{:?}", fleet.failed);
-        assert!(fleet.now() < 120 * SECOND, "it does not get there");
+        assert!(fleet.now() < 120 * SECOND, "the batch does not end");
     }
     assert_right(&fleet, 6, 1);
 }

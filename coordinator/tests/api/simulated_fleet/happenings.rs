@@ -53,7 +53,11 @@ impl SimulatedFleet {
             ToWorker::Assignments(Assignments { job, trial_set, items, .. }) => {
                 if items.iter().any(|assignment| assignment.is_drawn) {
                     let known = worker.distributions.get(&job);
-                    assert_eq!(known, Some(&distribution(trial_set)), "what it draws from");
+                    assert_eq!(
+                        known,
+                        Some(&distribution(trial_set)),
+                        "the worker has the distribution to draw from"
+                    );
                 }
                 for assignment in items {
                     // The engine blames a loss on the items that it assigned first.

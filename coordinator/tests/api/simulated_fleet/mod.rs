@@ -1,5 +1,5 @@
-//! A fleet in virtual time: the real engine, and workers that take as long as
-//! they say, over a network with latency. No sockets, no sleeping.
+//! A fleet in virtual time: the real engine, and simulated workers of given speeds behind a network
+//! with latency. There are no sockets, and nothing sleeps.
 //!
 //! A worker that [joins by hand](SimulatedFleet::join_by_hand) has neither latency nor a time of
 //! its own: it computes on the test's command.
@@ -40,8 +40,7 @@ pub struct FleetModel {
     pub latency: Duration,
     /// Mean time of a trial on a worker of speed 1.
     pub trial: Duration,
-    /// Trials take from 1 - dispersion to 1 + dispersion times that, by genotype
-    /// and trial.
+    /// By genotype and trial, the time varies from 1 - dispersion to 1 + dispersion times the mean.
     pub dispersion: f64,
     /// Whether a worker stops an item that it is told to drop; otherwise it finishes the item
     /// first.
@@ -67,7 +66,7 @@ pub enum Conduct {
     LiesAtTheEnd,
     /// It reports that they fail.
     Fails,
-    /// It returns nothing, but its heart beats.
+    /// It returns nothing, but sends heartbeats.
     Hangs,
     /// It returns a result of the wrong length.
     Babbles,
@@ -112,7 +111,7 @@ pub struct SimulatedFleet {
     pub quarantined: Vec<(String, String)>,
     /// Genotypes that take down the worker that computes them.
     pub poisonous: BTreeSet<u64>,
-    /// Time until that, relative to the time of a result.
+    /// Time until a poisonous genotype takes its worker down, relative to the time of a result.
     pub poison_takes: u32,
     /// Genotypes that cannot be computed.
     pub failing: BTreeSet<u64>,
