@@ -1,11 +1,10 @@
-//! The protocol only grows: everything that was promised to clients stays.
+//! The protocol only grows: every promise to clients stays.
 //!
 //! `worker.proto` may change with its version: workers come from the same release as their
 //! coordinator. Only the [`HANDSHAKE`] stays, so that a coordinator can refuse workers of another
 //! version and say why.
 //!
-//! `swarm.v1.binpb` is the descriptor of the promised interface. After additions, promise them,
-//! too, with
+//! `swarm.v1.binpb` is the descriptor of the promised interface. Promise additions with
 //!
 //! ```sh
 //! SWARM_PROMISE=1 cargo test -p swarm-proto --test compatibility
@@ -137,12 +136,12 @@ fn the_protocol_keeps_its_promises() {
     let broken = broken(&promised(), &present());
     assert!(
         broken.is_empty(),
-        "others rely on what is gone or has changed; add something new beside it, or, in \
+        "clients rely on the lines that are gone or changed; add new ones beside them, or, in \
          worker.proto, raise PROTOCOL_VERSION_CURRENT: {broken:#?}"
     );
 }
 
-/// The promises that `change` breaks, applied to a protocol with a bit of everything.
+/// The promises that `change` breaks in a protocol with an element of every kind.
 fn broken_by(change: impl FnOnce(&mut FileDescriptorSet)) -> Vec<String> {
     let mut changed = present();
     change(&mut changed);
@@ -240,7 +239,7 @@ fn raise_worker_version(set: &mut FileDescriptorSet) {
 }
 
 #[test]
-fn what_workers_are_told_changes_with_its_version_and_the_handshake_never() {
+fn messages_of_workers_change_with_their_version_and_the_handshake_never() {
     let change = |set: &mut FileDescriptorSet| message(set, "Assignment").field.clear();
     assert!(!broken_by(change).is_empty(), "without another version");
     let with_version = broken_by(|set| {
