@@ -1,7 +1,7 @@
 #!/bin/sh
-# Creates an authority, and the coordinator's certificate signed by it for the names and IP
-# addresses under which other machines reach the coordinator. docker/compose.tls.yaml reads
-# them. An existing authority stays, the certificate is renewed.
+# Creates an authority, and a certificate signed by it for the names and IP addresses under which
+# other machines reach the coordinator. docker/compose.tls.yaml reads them. An existing authority
+# stays, and the certificate is renewed.
 set -eu
 cd "$(dirname "$0")"
 
@@ -16,8 +16,7 @@ for name in "$@"; do
     esac
 done
 
-# Only you can read the directory. Single files of it are mounted into containers, whose
-# user can read them.
+# Only you can read the directory. Containers mount single files of it, which their user can read.
 umask 077
 mkdir -p secrets
 for file in ca.pem coordinator.pem coordinator.key; do

@@ -4,8 +4,7 @@ set -eu
 cd "$(dirname "$0")"
 
 command -v openssl >/dev/null || { echo "error: needs openssl, to draw random tokens" >&2; exit 1; }
-# Only you can read the directory. Single files of it are mounted into containers, whose
-# user can read them.
+# Only you can read the directory. Containers mount single files of it, which their user can read.
 umask 077
 mkdir -p secrets
 for token in client.token worker.token; do

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Builds the images, brings a fleet up on a real engine, kills parts of it, and
-# compares digests. Skips, and says so, where there is no engine.
+# Builds the images, brings a fleet up on a real engine, kills parts of it, and compares digests.
+# Without an engine, it prints that it is skipped.
 #
-# Where no registry is reachable, stand-ins for the base images are made of Debian
-# packages and of this machine's Rust; they stay for the next time. The rest is
-# removed, whatever happens; with KEEP_BUILD=1 the layers of the build stay, too.
+# If no registry is reachable, it makes stand-ins for the base images from Debian packages and this
+# machine's Rust, and keeps them for the next time. It always removes everything else, except the
+# layers of the build with KEEP_BUILD=1.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -12,7 +12,8 @@ cd "$(dirname "$0")/.."
 GENERATIONS=800
 
 step() { printf '\n-- %s\n' "$*"; }
-# The forms that .ci/run looks for: this machine cannot; it could.
+# .ci/run looks for these two beginnings: this machine cannot run the test, or could after an
+# installation.
 skip() { printf 'SKIPPED: the fleet of containers is not tested: %s\n' "$*"; exit 0; }
 skip_installable() {
     printf 'SKIPPED, but can be installed: the fleet of containers is not tested: %s\n' "$*"
@@ -36,7 +37,7 @@ expect() {
     local code=$1 pattern=$2 output actual=0
     shift 2
     output=$("$@" 2>&1 </dev/null) || actual=$?
-    # Without what the compose tool adds: what it creates; the exit code, once more.
+    # Drops the lines that the compose tool adds: the names of what it creates, and the exit code.
     output=$(grep -Ev '^ *(Creating|Starting|Container|Network|Volume) |^[0-9]+$' <<< "$output" || true)
     [[ $actual =~ ^($code)$ ]] || fail "exit code $actual, not $code, of: $* ($output)"
     grep -q -- "$pattern" <<< "$output" || fail "no \"$pattern\" in: $output"
@@ -49,7 +50,7 @@ need() {
     command -v "$1" >/dev/null && return
     [[ $EUID == 0 ]] && command -v apt-get >/dev/null || return
     local wait
-    # Registries fail for a moment now and then.
+    # Registries sometimes fail for a moment.
     for wait in 0 10 30; do
         sleep "$wait"
         apt-get update -qq && apt-get install -qq --no-install-recommends "$2" >/dev/null && break
@@ -123,7 +124,7 @@ make_rust() {
 fleet() { "${compose[@]}" -p "$project" -f docker/compose.yaml "${overlays[@]}" "$@"; }
 # swarmctl in its container.
 swarmctl() { fleet run --rm -T swarmctl "$@" </dev/null; }
-# The first container of a service. `head` would not read the others, which breaks the pipe.
+# The first container of a service. `head` would stop reading, and so break the pipe.
 container() { fleet ps -q "$1" | sed -n 1p; }
 is_healthy() { [[ $(docker inspect -f '{{.State.Health.Status}}' "$1") == healthy ]]; }
 n_workers() { swarmctl workers --output csv 2>/dev/null | tail -n +2 | wc -l; }
@@ -135,8 +136,8 @@ last_digest() { grep -o '"digest": *"[0-9a-f]*"' | tail -n 1 | cut -d'"' -f4; }
 restarts() { docker inspect -f '{{.RestartCount}}' "$1"; }
 has_restarted() { (($(restarts "$1") > 0)) && [[ $(docker inspect -f '{{.State.Running}}' "$1") == true ]]; }
 
-# What a crash looks like to the engine: `docker kill` counts as a wish to have
-# the container stopped, after which nothing restarts it.
+# Kills the process itself, as a crash does. After `docker kill`, the engine would not restart the
+# container.
 crash() {
     local pid
     pid=$(docker inspect -f '{{.State.Pid}}' "$1")
@@ -150,7 +151,7 @@ crash() {
 
 cleanup() {
     local code=$?
-    # The compose tool takes these before it removes anything.
+    # The compose tool removes nothing unless these variables are set.
     export SWARM_SECRETS=${SWARM_SECRETS:-none} SWARM_CERTIFICATES=${SWARM_CERTIFICATES:-none}
     ((code == 0)) || { fleet ps; fleet logs --tail 20; } 2>&1 || true
     for project in "$work_name" "$work_name-away"; do
@@ -206,7 +207,7 @@ test_kills() {
     wait_for "more generations" has_come_to $((seen + 10)) "$coordinator"
     docker kill "$coordinator" >/dev/null
     seen=$(generation "$coordinator")
-    ((seen < GENERATIONS - 1)) || fail "all was done before the coordinator was killed"
+    ((seen < GENERATIONS - 1)) || fail "the run ended before the coordinator was killed"
     fleet up -d --scale worker=3
     echo "coordinator killed after generation $seen, and up again with three workers"
     wait_for "three workers" has_workers 3
@@ -270,8 +271,8 @@ trap cleanup EXIT
 choose_compose
 choose_base_images
 
-# Ports that are free, and a profile that builds fast: an optimised build takes three times as
-# long, and everything else in the images is the same.
+# Takes free ports, and a profile that builds fast: an optimised build takes three times as long,
+# and everything else in the images is the same.
 export SWARM_PORT=0 SWARM_TLS_PORT=0 PROFILE=${PROFILE:-dev} WORKER_CPUS=1
 mkdir "$work/docker" "$work/configs"
 cp docker/make-*.sh "$work/docker/"
@@ -280,7 +281,7 @@ sed "s/\"generations\": 60/\"generations\": 5/" configs/quickstart.json > "$work
 chmod -R go+rX "$work/configs"
 export SWARM_CONFIGS=$work/configs
 if [[ $BUILD_IMAGE == swarmevo-stand-in/* ]]; then
-    # They bring no network of their own.
+    # Stand-ins build with this machine's network.
     for service in coordinator worker swarmctl; do
         printf '%s: {build: {network: host}}\n' $service
     done | sed '1i services:' | sed '2,$s/^/  /' > "$work/network.yaml"
