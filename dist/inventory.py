@@ -1,9 +1,9 @@
-"""Writes what a program is made of: its libraries as an SBOM, and their licences.
+"""Writes the SBOM of a program's libraries, and their licences.
 
 usage: inventory.py MANIFEST PACKAGE TARGET --sbom FILE --licences FILE
 
-Libraries are those that Cargo links for the target: none of tests, and none of the build itself.
-The SBOM is CycloneDX, in JSON; it has no time and no random number in it.
+Lists the libraries that Cargo links for the target, without those of tests and of the build itself.
+The SBOM is CycloneDX, in JSON, without times and random numbers.
 """
 
 import argparse
@@ -19,19 +19,19 @@ from cyclonedx.schema import OutputFormat, SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
 from packageurl import PackageURL
 
-# How files begin that say under which conditions a library may be used.
+# Beginnings of the names of files with licences.
 TEXTS = ("LICENSE", "LICENCE", "COPYING", "NOTICE", "COPYRIGHT", "UNLICENSE")
 
 
 def metadata(manifest: Path, target: str) -> dict:
-    """What Cargo knows of the packages of a workspace."""
+    """Cargo's description of the packages of a workspace."""
     command = ["cargo", "metadata", "--locked", "--format-version", "1"]
     command += ["--filter-platform", target, "--manifest-path", manifest]
     return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
 def linked(found: dict, name: str) -> dict[str, list[str]]:
-    """The ids of a package and of all that is linked to it, each with those that it needs."""
+    """The ids of a package and of all packages linked into it, each with its dependencies."""
     nodes = {node["id"]: node for node in found["resolve"]["nodes"]}
     packages = {package["id"]: package for package in found["packages"]}
     members = set(found["workspace_members"])
@@ -96,7 +96,7 @@ def sbom(packages: list[dict], needs: dict[str, list[str]], name: str) -> str:
 
 
 def licences(packages: list[dict]) -> str:
-    """The licences of libraries of others, and their texts; each text once."""
+    """The licences of other people's libraries, with each text once."""
     texts: dict[str, list[str]] = {}
     for package in packages:
         if package["source"] is None:
