@@ -34,7 +34,7 @@ use tokio::{runtime::Runtime, task::JoinHandle};
 const DEFAULT_SECONDS: u64 = 3;
 const GENERATIONS: u64 = 20;
 const N_WORKERS: usize = 4;
-/// Short, so that pauses are sometimes longer and sometimes shorter.
+/// Short, so that some pauses are longer than the lease, and some shorter.
 const LEASE: &str = "1";
 const PAUSE_MS_MAX: u64 = 400;
 
@@ -334,7 +334,7 @@ fn say(text: &str) {
 }
 
 #[test]
-#[allow(clippy::disallowed_methods, reason = "it lasts for a given time")]
+#[allow(clippy::disallowed_methods, reason = "the test lasts for a given time")]
 fn any_mix_of_faults_comes_to_the_undisturbed_digest() {
     let seed =
         setting("SWARM_SOAK_SEED").unwrap_or_else(|| RandomState::new().build_hasher().finish());

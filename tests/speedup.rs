@@ -33,7 +33,8 @@ fn main() {
             let file = file.edit(|file| {
                 file["seed"] = json!(seed);
                 file["algorithm"]["generations"] = json!(N_TIMED_GENERATIONS + 1);
-                // Without re-evaluations and judgements of champions, which are not measured.
+                // Turns off re-evaluations and judgements of champions, which this does not
+                // measure.
                 file["algorithm"]["champion_every"] = json!(1000);
                 file["algorithm"]["champion_trials"] = json!(1);
                 file["algorithm"]["judgement_trials"] = json!(1);

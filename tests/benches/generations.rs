@@ -135,8 +135,8 @@ impl Run {
     }
 }
 
-/// Time between the commits of generations, except the last one, before which a champion is
-/// chosen.
+/// Time between the commits of generations. Leaves out the last one, because the champion is chosen
+/// before it.
 fn ms_per_generation(database: &Connection, n_warm_up: u64) -> f64 {
     let sql = "SELECT (max(at_ms) - min(at_ms)) * 1.0 / (count(*) - 1) FROM events
                WHERE kind = 'generation' AND generation >= ?1

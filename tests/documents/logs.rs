@@ -4,10 +4,10 @@ use std::{collections::BTreeSet, fs, path::Path};
 
 use harness::workspace_file;
 
-/// The sign for the varying parts of a message.
+/// Stands for a varying part of a message.
 const VARYING: &str = "…";
 
-/// A line, as the page writes it: message, level, fields.
+/// A line as on the page: message, level, fields.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Line {
     message: String,

@@ -33,7 +33,7 @@ fn expect_page(page: &str, expected: &str) {
     }
 }
 
-/// A page whose part between the markers of `name` is replaced.
+/// A page with another part between the markers of `name`.
 fn with_part(page: &str, name: &str, part: &str) -> String {
     let (begin, end) = (format!("<!-- generated: {name} -->\n"), format!("<!-- end: {name} -->"));
     let (before, rest) = page.split_once(&begin).expect("the page has the marker");

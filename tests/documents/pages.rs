@@ -1,4 +1,4 @@
-//! Pages of the manual that sources, messages and scripts name exist.
+//! Every page that sources, messages and scripts name exists.
 
 use std::{fs, path::Path};
 

@@ -15,7 +15,7 @@ fn the_page_on_programs_has_their_help() {
          `UPDATE_DOCS=1 cargo test -p fleet-tests\n--test documents programs::` writes it.\n",
     );
     for program in ["coordinator", "worker"] {
-        // Without the variables of this shell, which would appear as defaults of options.
+        // Clears the environment, because its variables would appear as defaults of options.
         let output = Command::new(binary(program))
             .arg("--help")
             .env_clear()

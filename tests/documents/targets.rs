@@ -1,4 +1,5 @@
-//! Targets that Cargo does not search for tests, to save compile time, have none.
+//! Cargo does not search some targets for tests, which saves compile time. Checks that these
+//! targets have no tests.
 
 use std::fs;
 

@@ -12,7 +12,7 @@ fn every_name_that_scripts_see_is_in_the_reference() {
     let names: Vec<&str> =
         rows.filter_map(|row| row.split_once("\" = ")).map(|(name, _)| name).collect();
     assert!(names.len() > 30, "{names:?}");
-    // In code, alone or as a part: `robot.distance(other)`.
+    // The name is in code, alone or in an expression such as `robot.distance(other)`.
     let code: Vec<&str> = reference.split('`').skip(1).step_by(2).collect();
     let words = |text: &str| -> Vec<String> {
         let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');

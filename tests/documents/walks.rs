@@ -28,7 +28,7 @@ const ANY_LINES: &str = "...";
 #[derive(Debug, PartialEq, Eq)]
 struct Step {
     command: String,
-    /// Lines of the page that the output takes.
+    /// Lines of the page with the output.
     output: std::ops::Range<usize>,
 }
 
@@ -97,7 +97,7 @@ impl Normaliser {
             (r"\b\d+ bytes, SHA-256 [0-9a-f]{64}", "SHA-256"),
             (r"SHA-256 [0-9a-f]{64}", "SHA-256"),
             (r"schema version \d+", "schema"),
-            // Printed only while much work remains.
+            // The program prints the ETA only while much work remains.
             (r" +ETA \d\d:\d\d:\d\d", ""),
             (r"127\.0\.0\.1:\d+", "ADDRESS"),
             // The widths of rules and columns depend on the widest time.
@@ -115,8 +115,8 @@ impl Normaliser {
         line
     }
 
-    /// Whether lines of a page consist of the whole output, and some or none of the remarks, each
-    /// in order.
+    /// Whether lines of a page consist of the whole output and of any of the remarks, in their
+    /// order.
     fn agree(&self, shown: &[String], output: &[String], remarks: &[String]) -> bool {
         let Some((line, rest)) = shown.split_first() else { return output.is_empty() };
         if line.trim() == ANY_LINES {
@@ -132,7 +132,7 @@ impl Normaliser {
     }
 }
 
-/// An output in the form of the page: with as many lines before and after `...`.
+/// An output in the form of the page: it keeps as many lines before and after `...` as the page.
 fn abridged(shown: &[String], output: Vec<String>) -> Vec<String> {
     let is_any = |line: &String| line.trim() == ANY_LINES;
     let Some(before) = shown.iter().position(is_any) else { return output };
@@ -271,7 +271,7 @@ fn agree(shown: &str, output: &str) -> bool {
 }
 
 #[test]
-fn only_what_no_two_runs_have_in_common_may_differ() {
+fn only_times_speeds_and_other_chance_values_may_differ() {
     let output = "first\nmean 0.17  3.1 s  2595 episodes/s\nlast";
     assert!(agree(output, output));
     assert!(agree("first\nmean 0.17  12 ms  1 episodes/s\nlast", output));

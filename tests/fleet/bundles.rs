@@ -56,7 +56,7 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
     let fork = directory.path().join("fork.zip");
     export(&here, 2, &fork);
 
-    // In this process, and on a fleet.
+    // `verify` computes in its own process, and then on a fleet.
     let alone = swarmctl(["verify", path, "--generations", "all"]).expect_success().json();
     let on_fleet = here.swarmctl(&["verify", path, "--generations", "all"]).expect_success();
     assert_eq!(on_fleet.json(), alone);
@@ -95,7 +95,7 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
     export(&elsewhere, 1, &again);
     assert_eq!(fs::read(&again).unwrap(), fs::read(&file).unwrap());
 
-    // It continues there, as if it had been computed there.
+    // The imported experiment continues as if this coordinator had computed it.
     let _workers = WorkerProcess::start_many(&elsewhere, 2);
     elsewhere.swarmctl(&["fork", "1@1", "--seed", "99", "--generations", "3"]).expect_success();
     let [digest, expected] = [(&elsewhere, 3), (&here, 2)]
@@ -132,7 +132,7 @@ fn hostile(coordinator: &CoordinatorProcess, bundle: &Path) {
     assert_eq!(listed.as_array().unwrap().len(), 3, "nothing was created");
 }
 
-/// Prints a bundle as an independent reader of RO-Crates sees it.
+/// Reads a bundle with an independent reader of RO-Crates, and prints it.
 const READ_CRATE: &str = "\
 import json, os, sys
 from rocrate.rocrate import ROCrate
@@ -152,7 +152,7 @@ print(json.dumps({
 }))
 ";
 
-/// Prints the scalars of a directory as TensorBoard's own reader sees them.
+/// Reads a directory with TensorBoard's own reader, and prints its scalars.
 const READ_EVENTS: &str = "\
 import json, sys
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator

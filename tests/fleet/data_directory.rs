@@ -8,7 +8,7 @@ use harness::{Experiment, Outcome, binary};
 pub struct DataDirectory(tempfile::TempDir);
 
 impl DataDirectory {
-    /// Creates it, with `experiment.json` of two generations, which has run as experiment 1, and
+    /// Creates it, with `experiment.json` of two generations, its run as experiment 1, and
     /// `history.csv`.
     pub fn new() -> Self {
         let this = Self(tempfile::tempdir().unwrap());

@@ -13,7 +13,7 @@ fn run_embedded(experiment: &Experiment, n_workers: usize, extra: &[&str]) -> Ve
     swarmctl(args).expect_success().json_lines()
 }
 
-/// The lines without the values that depend on the clock.
+/// The lines, without values that depend on the clock.
 fn timeless(lines: &[Value]) -> Vec<Value> {
     let mut lines = lines.to_vec();
     for line in &mut lines {
@@ -50,7 +50,7 @@ fn separate_processes_and_one_process_give_the_same_bits() {
 /// Audits get the genotypes that other workers draw themselves, and the coordinator compares the
 /// results.
 #[test]
-fn genotypes_that_workers_draw_and_that_they_are_sent_give_the_same_bits() {
+fn drawn_and_sent_genotypes_give_the_same_bits() {
     let experiment = Experiment::tiny(3);
     let of_one = run_embedded(&experiment, 1, &[]);
     let coordinator = CoordinatorProcess::start_with(&["--audit-fraction", "1"]);

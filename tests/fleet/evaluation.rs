@@ -191,7 +191,7 @@ fn the_files_agree_with_each_other() {
 }
 
 #[test]
-fn what_is_not_known_is_named_in_one_line_with_what_is() {
+fn unknown_names_are_refused_in_one_line_with_the_known_ones() {
     let subject = Subject::new();
     for (args, expected) in [
         (["--inhibit", "msgs"], "did you mean `msg`?"),
@@ -332,7 +332,7 @@ fn shown(coordinator: &CoordinatorProcess, command: &str) -> Outcome {
 
 #[test]
 fn an_evaluation_that_waits_for_a_worker_is_seen_by_everybody() {
-    /// Limit of questions, which only a hanging coordinator reaches.
+    /// More questions than a working coordinator needs.
     const N_QUESTIONS_MAX: usize = 600;
     let subject = Subject::new();
     let coordinator = CoordinatorProcess::start();

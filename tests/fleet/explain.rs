@@ -22,7 +22,7 @@ use harness::{
 use serde_json::Value;
 use swarm_proto::v1::{Hello, ItemFailure, item_result, work_response};
 
-/// Limit of questions, which only a hanging coordinator reaches.
+/// More questions than a working coordinator needs.
 const N_QUESTIONS_MAX: usize = 600;
 /// Time between two questions.
 const PERIOD: Duration = Duration::from_millis(100);
@@ -64,7 +64,7 @@ fn wait_until<T>(
     panic!("the last findings are {found:#?}");
 }
 
-/// Waits for a finding of a kind, whose sentence contains some words.
+/// Waits for a finding of a kind whose text contains these words.
 fn wait_for_finding(coordinator: &CoordinatorProcess, id: u64, kind: &str, words: &str) -> Value {
     let is_it = |finding: &&Value| {
         finding["kind"] == kind && finding["what"].as_str().unwrap().contains(words)
@@ -158,7 +158,7 @@ fn send_signal(signal: &str, process: u32) {
 }
 
 #[test]
-fn every_command_for_an_experiment_that_waits_is_paused_or_has_ended_can_be_given() {
+fn every_advised_command_for_a_waiting_paused_or_ended_experiment_works() {
     let coordinator = CoordinatorProcess::start();
     let (id, other) = (submit(&coordinator), submit(&coordinator));
     let nobody = wait_for_finding(&coordinator, id, "no_workers", "");
@@ -176,7 +176,7 @@ fn every_command_for_an_experiment_that_waits_is_paused_or_has_ended_can_be_give
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn workers_in_quarantine_are_let_in_again_by_the_commands_that_are_advised() {
+async fn the_advised_commands_readmit_workers_in_quarantine() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
     // A shell would split these arguments.
@@ -220,7 +220,7 @@ async fn a_worker_that_hangs_is_named_and_may_be_restarted() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_worker_that_was_lost_waits_for_as_long_as_is_said_and_no_longer() {
+async fn a_lost_worker_waits_no_longer_than_stated() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
     let mut other = connect(&coordinator, "other").await;
@@ -266,7 +266,7 @@ fn referee_of(coordinator: &CoordinatorProcess) -> u32 {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_the_referee_is_asked_is_shown_and_needs_no_help() {
+async fn questions_for_the_referee_are_shown_and_need_no_help() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
     let mut broken = connect(&coordinator, "broken-1").await;
@@ -301,7 +301,7 @@ fn limit_open_files(process: u32, n: u32) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_referee_that_cannot_be_started_is_asked_again_when_the_coordinator_has_what_it_lacked() {
+async fn a_referee_that_cannot_be_started_is_asked_again_once_there_are_enough_open_files() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
     let mut broken = connect(&coordinator, "broken").await;
@@ -338,7 +338,7 @@ fn audits_that_wait_for_a_second_worker_are_done_when_it_is_started() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn individuals_that_workers_were_lost_with_are_computed_again_by_themselves() {
+async fn individuals_of_lost_workers_are_computed_again_without_help() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
     let mut mortal = connect(&coordinator, "mortal").await;
@@ -383,7 +383,7 @@ fn follow(
 }
 
 #[test]
-fn what_an_experiment_waits_for_is_said_at_once_to_those_who_watch_and_of_the_fleet() {
+fn watchers_are_told_at_once_why_an_experiment_waits() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
     let mut following = ["watch", "wait"].map(|command| follow(&coordinator, command, id));
@@ -410,7 +410,7 @@ fn what_an_experiment_waits_for_is_said_at_once_to_those_who_watch_and_of_the_fl
 }
 
 #[test]
-fn whoever_only_looks_is_told_at_an_interrupt_that_no_experiment_changes() {
+fn an_interrupted_watcher_is_told_that_no_experiment_changes() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
     for command in ["watch", "wait"] {

@@ -20,16 +20,16 @@ use std::sync::OnceLock;
 
 use harness::{CoordinatorProcess, Experiment, LogLine, Watch, undisturbed};
 
-/// Number of generations of the experiments here.
+/// Number of generations of these experiments.
 const GENERATIONS: u64 = 6;
 
-/// A generation takes tens of milliseconds, enough time for a fault.
+/// An experiment whose generations take tens of milliseconds each, enough time for a fault.
 static SMALL: Subject = Subject::new(|| Experiment::small(GENERATIONS));
-/// Two workers of one slot each get its items in several portions.
+/// An experiment with more items than two workers of one slot get at once.
 static MANY: Subject = Subject::new(|| {
     Experiment::small(GENERATIONS).edit(|e| e["algorithm"]["population_size"] = 60.into())
 });
-/// For faults that need no time.
+/// A short experiment, for faults that need no time.
 static TINY: Subject = Subject::new(|| Experiment::tiny(GENERATIONS));
 
 /// A second experiment, beside another one.

@@ -79,7 +79,7 @@ fn directory() -> DataDirectory {
 }
 
 #[test]
-fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
+fn a_file_of_another_kind_is_refused_in_one_line_with_its_kind() {
     let directory = directory();
     let mut problems = Vec::new();
     for (command, taken) in TAKERS {
@@ -112,7 +112,7 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
 }
 
 #[test]
-fn a_file_where_an_experiment_is_named_is_said_to_be_one() {
+fn a_file_in_place_of_an_experiments_name_is_refused_with_its_kind() {
     let directory = directory();
     for command in ["history", "watch", "replay", "individual", "export", "fork", "delete"] {
         for (file, kind) in FILES.iter().filter(|(file, _)| file.contains('.')) {

@@ -13,7 +13,7 @@ fn fork(coordinator: &CoordinatorProcess, args: &[&str]) -> Value {
 }
 
 #[test]
-fn a_fork_shares_the_past_of_its_parent_and_its_future_if_nothing_is_changed() {
+fn a_fork_shares_the_past_of_its_parent_and_without_changes_its_future() {
     let mut coordinator = CoordinatorProcess::start();
     let workers = WorkerProcess::start_many(&coordinator, 2);
     let parent = coordinator.submit(&Experiment::tiny(5).path());
@@ -45,7 +45,7 @@ fn a_fork_shares_the_past_of_its_parent_and_its_future_if_nothing_is_changed() {
         assert_ne!(found[3], expected[3]);
     }
 
-    // The state is the same, so the genotypes are the same with any swarm.
+    // The state is the same, so a change of the swarm changes no genotype.
     let genotypes = |address: &str| {
         let population = coordinator.swarmctl(&["individual", address]).expect_success().json();
         let individuals = population["individuals"].as_array().unwrap().clone();

@@ -28,7 +28,11 @@ fn runs_of_a_group_share_the_fleet_and_have_the_bits_of_runs_alone() {
     let more = submit("7..8");
     assert_eq!(all(&more, "seed"), [7, 8, 7, 8]);
     let ids = [&submitted[0]["id"], &submitted[1]["id"]];
-    assert_eq!([&more[0]["id"], &more[2]["id"]], ids, "what exists is not submitted again");
+    assert_eq!(
+        [&more[0]["id"], &more[2]["id"]],
+        ids,
+        "existing experiments are not submitted again"
+    );
 
     coordinator.swarmctl(&["watch", "--quiet", "sizes"]).expect_success();
     let listed = coordinator.swarmctl(&["list", "sizes"]).expect_success().json();
@@ -41,7 +45,7 @@ fn runs_of_a_group_share_the_fleet_and_have_the_bits_of_runs_alone() {
     }
     assert_eq!(runs.values().map(Vec::len).collect::<Vec<_>>(), [4; 4]);
     let at_ms = |generation: &Value| generation["completed_at_ms"].as_u64().unwrap();
-    // The ones submitted at once; the others may follow after these have ended.
+    // These runs were submitted at once; the others may begin after their end.
     let at_once = ids.map(|id| &runs[&id.as_u64().unwrap()]);
     let last_to_begin = at_once.iter().map(|run| at_ms(run[0])).max().unwrap();
     let first_to_end = at_once.iter().map(|run| at_ms(run[3])).min().unwrap();

@@ -33,7 +33,7 @@ fn bits(values: &Value) -> Vec<u64> {
     values.as_array().unwrap().iter().map(|value| value.as_f64().unwrap().to_bits()).collect()
 }
 
-/// The fitness of an individual simulated again, which needs exactly its genes.
+/// Simulates an individual again; only its exact genes give its fitness.
 fn simulated_again(address: &str, data_dir: &Path) -> Vec<u64> {
     let args = ["simulate", address, "--data-dir", data_dir.to_str().unwrap()];
     let simulation = swarmctl(args).expect_success().json();
@@ -63,8 +63,7 @@ fn individuals_come_back_bit_for_bit_across_kills_from_a_coordinator_and_without
     for id in ids {
         for generation in [0, 3] {
             let whole = format!("{id}@{generation}");
-            // While the coordinator runs, the genotypes come from the coordinator and from its
-            // file.
+            // While the coordinator runs, both the coordinator and its file give the genotypes.
             let population = coordinator.swarmctl(&["individual", &whole]).expect_success().json();
             let read = swarmctl(["individual", &whole, "--data-dir", directory]);
             assert_eq!(read.expect_success().json(), population);

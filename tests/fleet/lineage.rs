@@ -91,5 +91,5 @@ fn an_identical_experiment_is_named_and_answers_at_once() {
     assert!(anew.stderr.contains("`--reuse` returns that one"), "{}", anew.stderr);
     assert_eq!(id(&submit(&["--reuse", "--seed", "8"])), 3);
     assert_eq!(id(&submit(&["--reuse", "--generations", "3"])), 4);
-    assert_eq!(id(&submit(&["--reuse"])), 1, "and not the one that has not ended");
+    assert_eq!(id(&submit(&["--reuse"])), 1, "the completed one goes before the unfinished one");
 }

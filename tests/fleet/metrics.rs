@@ -42,7 +42,7 @@ fn check_with_promtool(samples: &Samples) {
 }
 
 #[test]
-fn figures_agree_with_what_a_run_did() {
+fn figures_agree_with_the_work_of_a_run() {
     let (coordinator, address) = coordinator();
     let (mut worker, worker_address) = worker(&coordinator);
     let id = coordinator.submit(&Experiment::small(3).path());
@@ -61,7 +61,7 @@ fn figures_agree_with_what_a_run_did() {
     let sum = "SELECT sum(episodes) FROM generations WHERE experiment_id = ?1";
     let in_generations: f64 =
         coordinator.database().query_row(sum, [id], |row| row.get(0)).unwrap();
-    assert!(episodes > in_generations, "{episodes}: held-out trials come on top");
+    assert!(episodes > in_generations, "{episodes} include held-out trials");
     assert_eq!(in_generations, 3.0 * 12.0 * 3.0);
     // Ten robots, 300 steps.
     assert_eq!(ours.value("swarm_worker_robot_steps_total", &[]), episodes * 3_000.0);
@@ -182,7 +182,7 @@ fn a_worker_without_a_coordinator_says_so() {
 }
 
 #[test]
-fn an_address_that_others_reach_is_warned_of() {
+fn an_address_beyond_loopback_causes_a_warning() {
     let coordinator = CoordinatorProcess::start_with(&["--metrics-listen", "0.0.0.0:0"]);
     let warning = "everybody who reaches this address can read the metrics";
     let line = coordinator.process.wait_for("warning", |line| line["message"] == warning);

@@ -51,7 +51,7 @@ fn names_are_unique_and_say_what_the_metric_is() {
 }
 
 #[test]
-fn the_dashboard_asks_for_metrics_that_there_are() {
+fn the_dashboard_asks_for_existing_metrics() {
     let mut names = BTreeSet::new();
     for metric in all_metrics() {
         match metric.kind {
@@ -77,7 +77,7 @@ fn promtool_accepts_the_configuration() {
     }
 }
 
-/// With a fleet at work, an experiment without end, and a call that failed.
+/// The fleet is at work on an endless experiment, and a call has failed.
 #[test]
 fn every_panel_shows_something_to_a_real_prometheus() {
     let listen = ["--metrics-listen", "127.0.0.1:0"];

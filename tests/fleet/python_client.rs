@@ -40,7 +40,7 @@ fn a_python_script_submits_and_follows_to_the_undisturbed_digest() {
     assert_undisturbed(&python.run(&args), &digests);
     // The same request id: the same experiment, shown again.
     assert_undisturbed(&python.run(&args), &digests);
-    // The changes that the script makes in the file.
+    // The script's options change the file.
     let args = [&args[..3], &["--seed", "8", "--generations", "2"]].concat();
     let changed = python.run(&args);
     assert_eq!(changed.code, Some(0), "{changed:#?}");

@@ -15,9 +15,9 @@ use harness::{Outcome, binary, skipped_for_want_of, swarmctl, workspace_file};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Number of generations of each run to repeat: `SWARM_TEST_GENERATIONS`; `.ci/run` sets 3.
-/// Without it, the tests repeat one generation of one run by each algorithm, and enough
-/// evaluations to cover each task and each kind of neurons.
+/// Number of generations of each run to repeat: `SWARM_TEST_GENERATIONS`; `.ci/run` sets 3. Without
+/// it, the tests repeat one generation of one run per algorithm, and evaluations that cover each
+/// task and each kind of neurons.
 fn n_generations() -> Option<usize> {
     let text = env::var("SWARM_TEST_GENERATIONS").ok()?;
     let n = text.parse();
@@ -214,7 +214,8 @@ fn evaluations_have_the_same_bits_again() {
             }
         }
         swarmctl(&args).expect_success();
-        // Without the names of the conditions, which are their changes here.
+        // Drops the names of the conditions, because this command names each condition by its
+        // change.
         let rows = |directory: &Path| -> Vec<String> {
             let text = fs::read_to_string(directory.join("trials.csv")).unwrap();
             let rows = text.lines().skip(1).map(|row| row.rsplitn(5, ',').collect::<Vec<_>>());
@@ -310,7 +311,7 @@ fn project_with(script: &str) -> TempDir {
 }
 
 #[test]
-fn pages_have_the_tables_that_scripts_make_of_the_runs() {
+fn pages_have_the_tables_of_the_scripts() {
     let Some(project) = project_with_all_runs() else { return };
     for (name, page) in
         [("compare.py", "docs/notebook/2026-11-claims.md"), ("thesis.py", "docs/reproduction.md")]
@@ -326,7 +327,7 @@ fn pages_have_the_tables_that_scripts_make_of_the_runs() {
 }
 
 #[test]
-fn mechanisms_of_a_champion_of_each_file_are_told() {
+fn the_report_on_mechanisms_covers_a_champion_of_each_file() {
     let Some(mut command) = python_script(results("mechanisms.py")) else { return };
     let directory = tempfile::tempdir().unwrap();
     let champions = directory.path().join("champions");

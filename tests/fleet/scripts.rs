@@ -81,8 +81,7 @@ fn a_script_that_acts_gives_the_same_bits_on_one_and_on_four_unlike_workers_thro
         objects.insert("lamp".into(), lamp);
     });
     let mut coordinator = CoordinatorProcess::start();
-    // Two workers with the instructions that every processor has, two with the best of this
-    // processor.
+    // Two workers use the instructions of every processor, two the best of this processor.
     let worker = |i: usize| {
         let isa: &[&str] = if i < 2 { &["--isa", "portable"] } else { &[] };
         WorkerProcess::start_with(&coordinator.url(), &format!("worker-{i}"), isa)
@@ -116,7 +115,7 @@ fn a_script_that_goes_wrong_fails_its_experiment_and_nothing_else() {
 }
 
 #[test]
-fn what_is_wrong_with_a_script_is_said_before_anything_is_computed() {
+fn mistakes_in_a_script_are_reported_before_anything_is_computed() {
     let script = "def fitness(world):\n    return len(world.robos)\n";
     let experiment = scripted(3, script);
     let path = experiment.path();
@@ -146,8 +145,8 @@ fn traces_and_simulations_have_the_measures_of_a_script() {
     assert!(header.ends_with(",metric_touching"), "{header}");
 }
 
-/// Harmless in the steps in which a script is tried; then it uses its whole budget in every call,
-/// so that a trial takes many minutes.
+/// A script that is harmless in the steps in which it is tried. Then it uses its whole budget in
+/// every call, so that a trial takes many minutes.
 const BURNS: &str = "
 def fitness(world):
     if world.step < 60:
@@ -193,7 +192,8 @@ fn a_script_that_burns_time_is_ended_by_cancelling_it_and_by_signals() {
 #[test]
 fn an_expensive_start_is_tried_for_a_moment_and_accepted_with_a_warning() {
     let coordinator = CoordinatorProcess::start();
-    // Nearly the whole budget of a call, in long statements: seconds for the tried steps.
+    // A call takes nearly its whole budget, in long statements, so trying the first steps takes
+    // seconds.
     let sums = vec!["i + j"; 60].join(", ");
     let loops = "for i in range(2000):\n        for j in range(100): x =";
     let script = format!("def fitness(world):\n    {loops} [{sums}]\n    return 1\n");

@@ -105,7 +105,7 @@ impl Files {
         )
     }
 
-    /// `swarmctl list`, whose error is one line that says all of this.
+    /// Runs `swarmctl list`, and asserts that its error is one line with all these parts.
     fn list_fails(&self, url: &str, options: &str, code: i32, expected: &[&str]) {
         let outcome = self.list(url, options);
         assert_eq!(outcome.code, Some(code), "{outcome:#?}");
@@ -315,7 +315,7 @@ fn a_fleet_works_over_tls_with_certificates_on_both_sides() {
 }
 
 #[test]
-fn a_certificate_that_expires_soon_is_said_by_all_who_use_it() {
+fn every_program_warns_of_its_certificates_that_expire_soon() {
     let files = Files::new().with_certificates();
     let mut params = CertificateParams::new(["localhost".to_owned()]).unwrap();
     #[expect(clippy::disallowed_methods, reason = "the programs compare it with their clock")]
@@ -357,7 +357,7 @@ fn a_python_script_speaks_tls() {
 }
 
 #[test]
-fn what_is_wrong_with_tls_is_said_in_words() {
+fn mistakes_with_tls_are_explained() {
     let files = Files::new().with_certificates();
     let encrypted = files.coordinator("--tls-cert @coordinator.pem --tls-key @coordinator.key");
     let url = https(&encrypted);
@@ -371,12 +371,12 @@ fn what_is_wrong_with_tls_is_said_in_words() {
     ] {
         files.list_fails(&url, &format!("{token} {options}"), code, &[expected]);
     }
-    // The certificate does not fit the address, but it fits the name.
+    // The certificate is valid for the name, and not for the address.
     let by_address = format!("https://{}", encrypted.address());
     files.list_fails(&by_address, &format!("{token} --tls-ca @ca.pem"), 8, &["--tls-domain"]);
     let named = format!("{token} --tls-ca @ca.pem --tls-domain localhost");
     assert_eq!(files.list(&by_address, &named).code, Some(0));
-    // One side without TLS.
+    // Only one side uses TLS.
     files.list_fails(&encrypted.url(), token, 8, &["https://"]);
     files.list_fails(&encrypted.url(), &format!("{token} --tls-ca @ca.pem"), 2, &["https://"]);
     let plain = files.coordinator("");

@@ -25,7 +25,7 @@ const NEED_NONE: [&str; 16] = [
 ];
 
 #[test]
-fn settings_that_cannot_be_read_stop_only_what_asks_a_coordinator() {
+fn settings_that_cannot_be_read_stop_only_commands_that_need_a_coordinator() {
     let directory = DataDirectory::new();
     let champion = directory.swarmctl("champion 1").expect_success().stdout;
     fs::write(directory.path().join("champion.json"), champion).unwrap();

@@ -80,13 +80,13 @@ fn a_champion_in_the_worlds_of_its_generation_has_the_fitness_that_is_stored() {
     let experiment = Experiment::small(4);
     let path = experiment.path();
     let data_dir = directory.path().to_str().unwrap();
-    // A seed that is not the file's.
+    // The seed differs from the file's.
     let args = ["run", path.to_str().unwrap(), "--seed", "99", "--data-dir", data_dir];
     let lines = swarmctl(args).expect_success().json_lines();
     let file = lines.last().unwrap()["champion_file"].as_str().unwrap();
     let champion: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
     let generation = champion["generation"].to_string();
-    // The seed with which it evolved.
+    // The champion file has the seed of its evolution.
     assert_eq!(champion["simulation"], sim_core::FINGERPRINT);
     assert_eq!(champion["seed"], 99);
 
@@ -134,7 +134,7 @@ fn a_trace_shows_every_robot_in_every_step_and_changes_no_bit() {
 }
 
 #[test]
-fn genotypes_and_traces_that_will_not_do_are_one_line_each() {
+fn unusable_genotypes_and_traces_are_refused_in_one_line() {
     let directory = tempfile::tempdir().unwrap();
     let genotype = directory.path().join("genotype.json");
     fs::write(&genotype, "[0.5, 0.5]").unwrap();

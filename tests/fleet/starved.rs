@@ -69,7 +69,7 @@ fn a_program_that_is_given_no_threads_says_so_and_ends() {
 }
 
 #[test]
-fn a_program_that_is_given_few_threads_makes_do_or_says_so() {
+fn a_program_that_is_given_few_threads_runs_or_says_so() {
     if !is_limited_by_processes() {
         return skipped("no right to be another user, whose processes are limited");
     }
@@ -116,7 +116,7 @@ fn ends_with(output: &Output, code: i32, what: &str) -> String {
     text.lines().last().unwrap_or_default().to_owned()
 }
 
-/// A run of a moment, in a directory of its own.
+/// A short experiment, and the command that runs it.
 fn run_line() -> (Experiment, String) {
     let experiment = Experiment::tiny(2);
     let line = format!("swarmctl run {} --data-dir data", experiment.path().display());
@@ -165,7 +165,7 @@ fn little_memory_is_enough_or_one_line_says_that_it_is_not() {
 }
 
 #[test]
-fn a_full_standard_output_loses_the_words_and_nothing_that_is_computed() {
+fn a_full_standard_output_loses_text_and_no_result() {
     let (_experiment, run) = run_line();
     for output_format in ["", "--output json"] {
         let directory = open_directory();
@@ -208,7 +208,7 @@ fn closed_and_full_standard_streams_stop_nothing() {
 }
 
 #[test]
-fn a_full_disk_leaves_no_half_of_a_file_and_keeps_what_was_there() {
+fn a_full_disk_leaves_no_half_files_and_keeps_existing_ones() {
     let Some(disk) = SmallDisk::mount(200 << 10) else {
         return skipped("no right to mount a file system");
     };
@@ -250,7 +250,7 @@ fn directories_that_cannot_be_used_are_named_in_one_line() {
     let (experiment, run) = run_line();
     let directory = open_directory();
     let nobody = "setpriv --reuid=65529 --regid=65533 --clear-groups";
-    // The file is ours alone.
+    // Other users cannot read the temporary file, so they get a copy.
     let file = directory.path().join("tiny.json");
     fs::write(&file, experiment.text()).unwrap();
     fs::set_permissions(&file, fs::Permissions::from_mode(0o644)).unwrap();

@@ -31,7 +31,7 @@ fn n_files_max() -> usize {
     line.and_then(|line| line.split_whitespace().next()?.parse().ok()).unwrap_or(usize::MAX)
 }
 
-/// Makes a call with the client's token on a connection of its own, which must not take long.
+/// Makes a call with the client's token on a connection of its own. The call must not take long.
 async fn list(url: &str) {
     let endpoint = Endpoint::from_shared(url.to_owned()).unwrap();
     let call = async {

@@ -99,13 +99,13 @@ fn no_error_is_wider_than_the_terminal() {
 }
 
 #[test]
-fn colours_do_not_move_columns_and_are_where_they_are_wanted() {
+fn colours_do_not_move_columns_and_appear_only_on_terminals_or_on_request() {
     let directory = directory();
     let Some(terminal) = terminal(&directory, 80) else { return };
     let tables = ["list", "history 1", "compare 1", "simulate 1@0/3"];
     for command in tables {
         let coloured = terminal.swarmctl(command, "").expect_success().stdout;
-        assert!(coloured.contains("\u{1b}[1m"), "{command} has colours: {coloured}");
+        assert!(coloured.contains("\u{1b}[1m"), "{command} has no colours: {coloured}");
         for (name, value) in [("NO_COLOR", "1"), ("TERM", "dumb"), ("CLICOLOR", "0")] {
             let plain = terminal.clone().with(name, value).swarmctl(command, "");
             let plain = plain.expect_success().stdout;
@@ -120,7 +120,7 @@ fn colours_do_not_move_columns_and_are_where_they_are_wanted() {
         }
         let forced = terminal.clone().with("CLICOLOR_FORCE", "1");
         let forced = forced.swarmctl(&format!("{command} | cat"), "").stdout;
-        assert!(forced.contains("\u{1b}[1m"), "{command} is to have colours: {forced}");
+        assert!(forced.contains("\u{1b}[1m"), "{command} has no colours: {forced}");
         // Programs get no colours, even if these are forced.
         let json = terminal.clone().with("CLICOLOR_FORCE", "1");
         let json = json.swarmctl(&format!("{command} --output json"), "").stdout;
@@ -148,5 +148,5 @@ fn a_group_is_deleted_only_if_somebody_types_yes() {
     let done = terminal.swarmctl("delete pair", "yes\n").expect_success();
     assert!(!done.stdout.contains("error"), "{}", done.stdout);
     let rest = directory.swarmctl("list --output csv").expect_success().stdout;
-    assert_eq!(rest.lines().count(), 2, "experiment 1 is none of the group: {rest}");
+    assert_eq!(rest.lines().count(), 2, "experiment 1, outside the group, is left: {rest}");
 }

@@ -37,7 +37,7 @@ fn files(path: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 }
 
 #[test]
-fn no_command_writes_over_a_file_unless_it_is_told_to() {
+fn no_command_overwrites_a_file_without_force() {
     let directory = DataDirectory::new();
     for (line, file) in WRITERS {
         let path = directory.path().join(file);
@@ -48,7 +48,7 @@ fn no_command_writes_over_a_file_unless_it_is_told_to() {
             "{line}"
         );
         let precious: Vec<u8> = b"precious".to_vec();
-        // Keeps a written database, because `--force` replaces nothing else there.
+        // Keeps a written data directory, because `--force` replaces only such a directory.
         let is_data_directory = written.iter().any(|(path, _)| path.ends_with("swarmevo.sqlite3"));
         if !is_data_directory {
             written.iter().for_each(|(path, _)| fs::write(path, &precious).unwrap());

@@ -7,12 +7,12 @@ use std::{
     sync::OnceLock,
 };
 
-/// Path of one of the workspace's programs: `coordinator`, `worker`, `swarmctl`.
+/// Path of a program of the workspace: `coordinator`, `worker` or `swarmctl`.
 ///
 /// Cargo builds programs only for the tests of their own package, so the first call builds them
-/// all, into the directory and profile of the running test. The build also names a test: with
-/// one, libraries have the same features as in `cargo test --workspace`, and are not compiled a
-/// second time.
+/// all, into the directory and profile of the running test. The build also names a test. This gives
+/// libraries the same features as in `cargo test --workspace`, so that Cargo does not compile them
+/// a second time.
 ///
 /// `SWARM_PROGRAMS` names a directory of built programs, so that a benchmark can compare two
 /// versions in turns.
@@ -33,8 +33,8 @@ fn build() -> PathBuf {
     };
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut build = Command::new(cargo);
-    // Cargo's variables about the test's package would make build scripts of dependencies, such
-    // as ring's, run again, and recompile half of the workspace.
+    // Removes Cargo's variables about the test's package. They would make build scripts of
+    // dependencies, such as ring's, run again, and recompile half of the workspace.
     for (name, _) in env::vars_os() {
         let text = name.to_string_lossy();
         if text.starts_with("CARGO_PKG_") || text.starts_with("CARGO_MANIFEST_") {

@@ -38,7 +38,7 @@ impl Experiment {
         Self::from_value(value)
     }
 
-    /// A smaller one still: a generation takes some hundredths of a second.
+    /// An even smaller one: a generation takes some hundredths of a second.
     pub fn tiny(generations: u64) -> Self {
         Self::small(generations).edit(|value| {
             let algorithm = &mut value["algorithm"];

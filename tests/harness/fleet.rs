@@ -132,7 +132,7 @@ impl CoordinatorProcess {
     }
 }
 
-/// Runs a coordinator that fails to start, or ends by itself, until its end.
+/// Runs a coordinator that fails to start or ends by itself, and waits for its end.
 pub fn run_coordinator(listen: &str, data_dir: &Path) -> Outcome {
     let mut command = Command::new(binary("coordinator"));
     command.args(["--listen", listen, "--data-dir"]).arg(data_dir);

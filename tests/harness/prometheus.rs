@@ -76,7 +76,7 @@ impl Prometheus {
         let encoded: String = expression.bytes().map(|byte| format!("%{byte:02X}")).collect();
         let path = format!("/api/v1/query?query={encoded}");
         let (status, text) = http_get(&self.address, &path);
-        // Prometheus answers like this while it starts.
+        // While Prometheus starts, it answers with 503.
         if status == 503 {
             return Vec::new();
         }

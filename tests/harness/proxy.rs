@@ -139,7 +139,7 @@ impl Drop for Proxy {
 }
 
 impl State {
-    /// Ends all connections; returns how many had not ended before.
+    /// Ends all connections; returns the number of those that had not ended.
     fn reset_all(&mut self) -> u64 {
         let resets = self.connections.drain(..).map(|c| c.shutdown(Shutdown::Both));
         resets.filter(Result::is_ok).count() as u64

@@ -8,7 +8,7 @@ use std::{
 
 use crate::{Outcome, binary, skipped_for_want_of};
 
-/// A terminal of some width, as `script` of util-linux makes one.
+/// A terminal of some width, made by `script` of util-linux.
 #[derive(Debug, Clone)]
 pub struct Terminal {
     directory: PathBuf,

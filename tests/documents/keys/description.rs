@@ -6,12 +6,12 @@ const UNITS: [&str; 12] = [
     "cm", "cm/s", "ms", "1/ms", "s", "steps", "substeps", "radians", "mV", "mM", "mS/cm2", "uF/cm2",
 ];
 
-/// What `Parameter::description` has put together.
+/// The parts that `Parameter::description` has put together.
 pub struct Description {
     pub meaning: String,
     /// Empty if there is none.
     pub unit: &'static str,
-    /// Empty if the words say nothing of it.
+    /// Empty if the description has no default.
     pub default: String,
 }
 
@@ -35,14 +35,14 @@ pub fn sentence(value: &Value) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
 }
 
-/// Where the first sentence ends, before its full stop.
+/// The end of the first sentence, before its full stop.
 fn first_sentence(text: &str) -> usize {
     let starts = |at: &usize| text[at + 2..].starts_with(|c: char| c.is_uppercase() || c == '`');
     let end = text.match_indices(". ").map(|(at, _)| at).find(starts);
     end.unwrap_or_else(|| text.trim_end_matches('.').len())
 }
 
-/// A default as it stands in a file, in code.
+/// A default, marked as code if it is a value of a file.
 fn in_code(default: &str) -> String {
     let is_value = default.parse::<f64>().is_ok() || ["true", "false", "null"].contains(&default);
     if is_value || default.starts_with('"') {

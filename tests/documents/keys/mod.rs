@@ -66,7 +66,7 @@ impl Page {
         }
     }
 
-    /// A row per name that may stand there.
+    /// A row for each name that the section allows.
     fn names(&mut self, section: &Section, variants: &[Variant]) {
         if variants.iter().all(|variant| variant.meaning.is_empty()) {
             return;
@@ -78,7 +78,7 @@ impl Page {
         }
     }
 
-    /// A row per key, and a sentence on keys without effect.
+    /// A row for each key, and a sentence on keys without effect.
     fn keys(&mut self, section: &Section, variants: &[Variant]) {
         let keys = merged(variants.iter().flat_map(|variant| &variant.keys));
         if !keys.is_empty() {
@@ -129,7 +129,7 @@ impl Page {
     }
 }
 
-/// Keys in the order of their names; those that differ by their owners alone, once.
+/// Keys in the order of their names. Keys that differ only in their owners become one.
 fn merged<'a>(keys: impl Iterator<Item = &'a Key>) -> Vec<Key> {
     let mut merged: Vec<Key> = Vec::new();
     for key in keys {
@@ -142,7 +142,7 @@ fn merged<'a>(keys: impl Iterator<Item = &'a Key>) -> Vec<Key> {
     merged
 }
 
-/// Names of variants, without an ending that all of many share.
+/// Names of variants, without an ending that all of several names share.
 fn owners(names: &[String]) -> String {
     const ENDING: &str = "_receptive_field";
     let short: Option<Vec<&str>> = names.iter().map(|name| name.strip_suffix(ENDING)).collect();
@@ -153,7 +153,7 @@ fn code(names: &[String]) -> String {
     format!("`{}`", names.join("`, `"))
 }
 
-/// How code hosts and the site name a heading in an address.
+/// The name of a heading in addresses, on code hosts and on the site.
 fn slug(heading: &str) -> String {
     let lower = heading.to_lowercase();
     let kept = lower.chars().filter(|c| c.is_alphanumeric() || " _-".contains(*c));
@@ -161,7 +161,7 @@ fn slug(heading: &str) -> String {
 }
 
 #[test]
-fn the_page_on_keys_says_what_the_schema_says() {
+fn the_page_on_keys_agrees_with_the_schema() {
     let expected = Page::write(&Schema::new(json_schema(ALGORITHMS)));
     expect_page(PAGE, &expected);
 }
@@ -178,7 +178,7 @@ fn the_page_on_keys_has_every_key_of_the_schema() {
 }
 
 #[test]
-fn the_file_of_the_guide_is_right() {
+fn the_file_of_the_guide_is_valid() {
     let page = fs::read_to_string(workspace_file(GUIDE)).unwrap();
     let (_, rest) = page.split_once("```json\n{\n  \"world\"").expect("the page has a whole file");
     let (file, _) = rest.split_once("\n```").unwrap();

@@ -1,6 +1,6 @@
 //! The order of `docs/keys.md`: that of a file.
 
-/// The begin of the page.
+/// The beginning of the page.
 pub const INTRODUCTION: &str = "\
 # Every key of an experiment file
 
@@ -22,17 +22,17 @@ The tables are those of the program: `swarmctl schema` prints the same for [edit
 /// Sections of one subject.
 pub struct Group {
     pub title: &'static str,
-    /// Where explanations are.
+    /// A sentence that leads to explanations.
     pub text: &'static str,
     pub sections: &'static [Section],
 }
 
-/// What stands in one place of a file.
+/// The values and keys that one place of a file may have.
 pub struct Section {
     /// The place; empty for the file itself.
     pub heading: &'static str,
-    /// Where the schema has it: in `$defs`, and further on. Several parts have a name each, by
-    /// which rows tell them apart.
+    /// The paths in the schema, below `$defs`. If there are several, each has a name, which its
+    /// rows show.
     pub parts: &'static [(&'static str, &'static str)],
     /// Whether each name has a table of its own.
     pub is_apart: bool,
@@ -56,7 +56,7 @@ const fn apart(heading: &'static str, parts: &'static [(&'static str, &'static s
     Section { heading, parts, is_apart: true }
 }
 
-/// Definitions that another page explains: the word for them, and the address.
+/// Definitions that another page explains, each with its word and the page's address.
 pub const ELSEWHERE: [(&str, &str, &str); 1] =
     [("GenotypeQuery", "queries", "experiment-files.md#what-a-query-selects")];
 

@@ -1,4 +1,4 @@
-//! Sections of the page as the schema has them: names and keys.
+//! Reads the names and keys of the page's sections from the schema.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use super::description::{Description, sentence};
 use super::parts::Section;
 
-/// What the schema says of keys that concern SpikeSwarmSim alone.
+/// The schema's description of keys that concern SpikeSwarmSim alone.
 const IGNORED: &str = "Accepted and ignored.";
 /// Keys of a population that do not depend on the algorithm.
 const OF_POPULATION: [&str; 4] = ["objects", "min_vals", "max_vals", "params"];
@@ -17,9 +17,9 @@ const TAGS: [&str; 3] = ["name", "scheme", "type"];
 /// The JSON Schema of experiment files.
 pub struct Schema(Value);
 
-/// One of the things that may stand in a place.
+/// One of the alternatives that a place allows.
 pub struct Variant {
-    /// Its name; empty if there is nothing else.
+    /// Its name; empty if there is no alternative.
     pub label: String,
     pub meaning: String,
     pub keys: Vec<Key>,
@@ -39,7 +39,7 @@ pub struct Key {
 }
 
 impl Key {
-    /// Whether the two are the same but for their owners.
+    /// Whether the two differ at most in their owners.
     pub fn is_same(&self, other: &Self) -> bool {
         let row = |key: &Self| {
             [&key.name, &key.values, &key.default, &key.meaning].map(|text| text.to_owned())
@@ -65,7 +65,7 @@ impl Schema {
         part.unwrap_or_else(|| panic!("the schema has no {path}"))
     }
 
-    /// The value that a reference leads to.
+    /// The target of a reference, or the value itself if it is none.
     pub fn resolved<'a>(&'a self, value: &'a Value) -> &'a Value {
         match value["$ref"].as_str() {
             Some(reference) => self.part(reference.trim_start_matches("#/$defs/")),
@@ -73,7 +73,7 @@ impl Schema {
         }
     }
 
-    /// What is said of a section as a whole.
+    /// The description of a section as a whole.
     pub fn meaning(&self, section: &Section) -> String {
         match section.parts {
             [("", _)] => String::new(),
@@ -82,7 +82,7 @@ impl Schema {
         }
     }
 
-    /// How variants with parameters stand in a file.
+    /// The form of a variant with parameters in a file.
     pub fn form(&self, section: &Section) -> Option<String> {
         let [(path, _)] = section.parts else { return None };
         let properties = &self.part(path)["oneOf"][0]["properties"];
@@ -91,7 +91,7 @@ impl Schema {
         Some(format!("`{{\"{tag}\": NAME, {rest}}}`"))
     }
 
-    /// What may stand in the place of a section.
+    /// The alternatives that the place of a section allows.
     pub fn variants(&self, section: &Section) -> Vec<Variant> {
         let mut variants = Vec::new();
         for &(path, label) in section.parts {
@@ -111,7 +111,7 @@ impl Schema {
         variants
     }
 
-    /// A variant with a name; none for what else stands for one, such as null.
+    /// A variant with a name; none for values without one, such as null.
     fn named(&self, part: &Value) -> Option<Variant> {
         let meaning = sentence(part);
         if let Some(name) = part["const"].as_str() {

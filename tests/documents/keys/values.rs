@@ -10,7 +10,7 @@ use super::schema::{Schema, is_ignored};
 use super::slug;
 
 impl Schema {
-    /// The values of a key whose numbers have this unit.
+    /// The values of a key. `unit`: the unit of its numbers.
     pub fn values(&self, value: &Value, unit: &str) -> String {
         if let Some(link) = self.link(value) {
             return link;
@@ -71,7 +71,7 @@ impl Schema {
         })
     }
 
-    /// One of several; names that only stand there for themselves are one list.
+    /// Alternatives. If all of them are names, they become one list.
     fn union(&self, variants: &[Value], unit: &str) -> String {
         let names: Vec<&Value> = variants
             .iter()
@@ -132,7 +132,7 @@ impl Schema {
         format!("list of {length}{items}{unit}")
     }
 
-    /// The names that may stand there and have no section, with their meanings.
+    /// The names that a value may have and that have no section, with their meanings.
     pub fn names_inside(&self, value: &Value) -> String {
         if self.link(value).is_some() {
             return String::new();
@@ -147,7 +147,7 @@ impl Schema {
     }
 }
 
-/// An object that has no keys, or keys that say nothing.
+/// An object without keys, or with keys that are constant or ignored.
 fn object_without_section(value: &Value) -> String {
     let properties = value["properties"].as_object();
     let known = properties.into_iter().flatten();
@@ -173,9 +173,9 @@ fn text(name: &Value) -> String {
     name.as_str().map_or_else(|| name.to_string(), str::to_owned)
 }
 
-/// Bounds as people say them; empty if there are none.
+/// Bounds in words; empty if there are none.
 fn range(value: &Value, unit: &str) -> String {
-    // So large that nobody means them.
+    // The page omits these bounds, which nobody reaches.
     let is_bound =
         |bound: &f64| ![MAGNITUDE, MAGNITUDE.sqrt(), u32::MAX.into()].contains(&bound.abs());
     let bound = |key: &str| value[key].as_f64().filter(is_bound);
@@ -199,7 +199,7 @@ fn range(value: &Value, unit: &str) -> String {
     }
 }
 
-/// With commas between thousands.
+/// A number with commas between thousands.
 fn number(number: f64) -> String {
     if number == PI {
         return "pi".to_owned();

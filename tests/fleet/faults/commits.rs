@@ -11,7 +11,7 @@ const SIGABRT: i32 = 6;
 /// Waits until the coordinator has died at the given step.
 fn wait_for_death(coordinator: &mut CoordinatorProcess, step: &str) {
     let status = coordinator.process.wait();
-    assert_eq!(status.signal(), Some(SIGABRT), "it died by itself");
+    assert_eq!(status.signal(), Some(SIGABRT), "the failpoint killed it");
     coordinator.process.wait_for("last words", |line| line["step"] == step);
 }
 
@@ -78,7 +78,7 @@ fn killed_between_the_store_and_the_driver_of_a_submission() {
     coordinator.restart();
     assert_eq!(resumed_at(&coordinator), 0);
     TINY.assert_undisturbed(coordinator.watch(1));
-    // Its client may have submitted it again, under the same request id.
+    // The client may have repeated the submission under the same request id.
     drop(submission);
     let list = coordinator.swarmctl(&["list"]).expect_success().json();
     assert_eq!(list.as_array().unwrap().len(), 1);
@@ -89,7 +89,11 @@ fn killed_before_a_cancellation_is_stored() {
     let mut coordinator = CoordinatorProcess::start_armed("kill before change 1");
     let id = TINY.submit(&coordinator);
     let cancelled = coordinator.swarmctl(&["cancel", &id.to_string()]);
-    assert_eq!(cancelled.code, Some(4), "the client knows that it does not know: {cancelled:?}");
+    assert_eq!(
+        cancelled.code,
+        Some(4),
+        "the client reports that the outcome is unknown: {cancelled:?}"
+    );
     wait_for_death(&mut coordinator, "before change");
     coordinator.restart();
     assert_eq!(resumed_at(&coordinator), 0);

@@ -13,7 +13,8 @@ fn a_coordinator_killed_within_a_generation_evaluates_it_again() {
     let id = MANY.submit(&coordinator);
     let watch = coordinator.watch(id);
 
-    // Later assignments than the first ones: some results have arrived, others are outstanding.
+    // These are later assignments than the first ones: some results have arrived, others are
+    // outstanding.
     let (n_seen, _) = wait_for_assignment(&coordinator, 3);
     let is_later = |line: &LogLine| line["message"] == "items assigned" && line["generation"] == 3;
     let (n_seen, _) = coordinator.process.find(n_seen, "second assignment", is_later);
@@ -27,7 +28,7 @@ fn a_coordinator_killed_within_a_generation_evaluates_it_again() {
     assert!(!coordinator.process.lines().iter().any(is_evaluated), "the kill came within it");
 
     coordinator.restart();
-    // Or at the previous one, whose commit may have been in progress.
+    // It may also continue at the previous generation, whose commit may have been in progress.
     assert!((2..=3).contains(&resumed_at(&coordinator)));
     // The workers and the watching client have reconnected by themselves.
     MANY.assert_undisturbed(watch);

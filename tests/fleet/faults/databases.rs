@@ -85,7 +85,7 @@ fn a_damaged_database_is_refused_untouched() {
 fn a_database_of_a_newer_version_is_refused_untouched() {
     let directory = data_directory();
     let database = Connection::open(directory.path().join(DATABASE)).unwrap();
-    // Its log, which is not in the main file yet, must stay, too.
+    // The database's log, which is not in the main file yet, must also stay.
     database.pragma_update(None, "wal_autocheckpoint", 0).unwrap();
     database.pragma_update(None, "user_version", 1000).unwrap();
     let copy = tempfile::tempdir().unwrap();

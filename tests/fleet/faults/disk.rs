@@ -37,7 +37,7 @@ fn on_a_full_disk_an_experiment_waits_and_goes_on_by_itself() {
     assert_eq!(refused.code, Some(1), "{refused:#?}");
     assert!(refused.stderr.contains("disk is full"), "{}", refused.stderr);
     assert!(!refused.stderr.contains("cannot reach"), "{}", refused.stderr);
-    // Commands that only read work.
+    // Commands that only read still work.
     let list = coordinator.swarmctl(&["list"]).expect_success().json();
     assert_eq!(list.as_array().unwrap().len(), 1);
     assert_eq!(list[0]["state"], "running");
@@ -105,7 +105,7 @@ fn a_commit_that_can_never_succeed_fails_its_experiment_and_no_other() {
     assert_eq!(finished.last["state"], "failed");
     let reason = finished.last["reason"].as_str().unwrap();
     assert!(reason.contains("as the test wants it"), "{reason}");
-    assert_eq!(finished.generations.len(), 2, "what was complete stays");
+    assert_eq!(finished.generations.len(), 2, "complete generations stay");
     OTHER.assert_undisturbed(coordinator.watch(sound));
 }
 
@@ -127,7 +127,7 @@ fn an_end_that_cannot_be_stored_is_stored_once_it_can() {
     let waits = format!("the end of experiment {id} waits");
     coordinator.process.wait_for("complaint", |line| message_contains(line, &waits));
     let list = coordinator.swarmctl(&["list"]).expect_success().json();
-    assert_eq!(list[0]["state"], "running", "it is not said to have ended before it has");
+    assert_eq!(list[0]["state"], "running", "a list shows the end only once it is stored");
 
     database.execute_batch("DROP TRIGGER refusal").unwrap();
     coordinator.process.wait_for("relief", |line| message_contains(line, "takes writes again"));

@@ -31,7 +31,7 @@ fn an_experiment_whose_configuration_was_edited_waits_for_a_person_and_the_other
     let write = "UPDATE experiments SET config = ?2 WHERE id = ?1";
     let original: String =
         coordinator.database().query_row(read, [edited], |row| row.get(0)).unwrap();
-    // Changes the seed, and nothing else.
+    // Changes only the seed.
     let changed = original.replace("\"seed\":7", "\"seed\":6");
     assert_ne!(changed, original);
     edit_and_restart(&mut coordinator, |database| {
@@ -67,7 +67,7 @@ fn an_experiment_whose_checkpoint_was_edited_does_not_come_to_another_digest() {
     let id = TINY.submit(&coordinator);
     coordinator.wait_for_generation(1);
     edit_and_restart(&mut coordinator, |database| {
-        // Changes a bit of a number, which is still a valid evolution.
+        // Changes a bit of a number. The evolution is still valid.
         let read = "SELECT state FROM keyframes";
         let mut state: Vec<u8> = database.query_row(read, [], |row| row.get(0)).unwrap();
         state[40] ^= 1;
@@ -77,7 +77,7 @@ fn an_experiment_whose_checkpoint_was_edited_does_not_come_to_another_digest() {
     let reason = wait_for_pause(&coordinator);
     assert!(reason.contains("its checkpoint"), "{reason}");
     let n_committed = coordinator.n_committed(id);
-    // The next start reports the same, and nothing has changed since.
+    // The next start reports the same damage, and changes nothing.
     coordinator.process.kill();
     coordinator.restart();
     assert_eq!(wait_for_pause(&coordinator), reason);
@@ -130,7 +130,7 @@ fn a_coordinator_whose_database_breaks_stops_and_fails_nothing() {
     let workers = WorkerProcess::start_many(&coordinator, 2);
     let id = TINY.submit(&coordinator);
     coordinator.wait_for_generation(0);
-    // The table of events points to a page that does not exist.
+    // Makes the table of events point to a page that does not exist.
     let database = coordinator.database();
     let root = "SELECT rootpage FROM sqlite_schema WHERE name = 'events'";
     let sound: u64 = database.query_row(root, [], |row| row.get(0)).unwrap();

@@ -114,8 +114,8 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
     let experiment = Experiment::tiny(GENERATIONS);
     let id = coordinator.submit(&experiment.path());
 
-    // Wrong sizes, with any values. It is the only worker: others might get copies of its items,
-    // and the coordinator would recall them before the answer.
+    // Results of wrong sizes, with any values. There is no second worker: it might get copies of
+    // the items, and the coordinator would recall the items before the answer.
     let wrong: [fn(usize) -> Vec<f64>; 4] = [
         |_| vec![],
         |n_trials| vec![f64::NAN; n_trials + 1],
@@ -212,7 +212,7 @@ async fn streams_that_are_not_the_protocol_are_ended_and_the_others_go_on() {
 /// The second generation of the first experiment.
 const POISONED: (u64, TrialSet) = (1, TrialSet::Generation(1));
 
-/// A worker that computes honestly, and dies at the first genotype of [`POISONED`].
+/// Runs a worker that computes honestly, and dies at the first genotype of [`POISONED`].
 async fn die_of(poison: Arc<OnceLock<Vec<f64>>>, url: String, name: String) {
     loop {
         let hello = Hello { name: name.clone(), ..hello() };
@@ -264,5 +264,5 @@ async fn a_genotype_that_takes_every_worker_down_is_computed_by_the_coordinator(
     let n_lost = n_lost(&coordinator);
     // Each of two trials may be an item of its own. The referee computes an item at its third
     // loss at the latest; losses of copies within one second count once.
-    assert!((2..=2 * 3 * 3).contains(&n_lost), "{n_lost}: no more than it takes");
+    assert!((2..=2 * 3 * 3).contains(&n_lost), "{n_lost} workers were lost");
 }

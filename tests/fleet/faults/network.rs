@@ -74,8 +74,8 @@ fn a_worker_that_hears_nothing_for_longer_than_its_lease_keeps_its_place() {
     let scene = Scene::start(&["--lease", "1"]);
     scene.network.hold(ToWorker);
     let before = scene.network.traffic().n_delivered[ToCoordinator as usize];
-    // At five heartbeats per lease, and with its remaining results, this takes longer than a
-    // lease.
+    // The worker sends five heartbeats per lease, and a few remaining results. So this number of
+    // messages takes longer than a lease.
     scene.network.wait_for("heartbeats", |traffic| {
         traffic.n_delivered[ToCoordinator as usize] > before + 12
     });

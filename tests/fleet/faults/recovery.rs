@@ -58,7 +58,7 @@ fn a_backup_of_a_running_experiment_continues_elsewhere_to_the_same_bits() {
 }
 
 #[test]
-fn a_copy_of_a_database_in_use_without_its_log_is_not_taken_for_the_whole() {
+fn a_copy_of_a_database_in_use_without_its_log_is_refused() {
     let mut coordinator = CoordinatorProcess::start();
     let workers = WorkerProcess::start_many(&coordinator, 2);
     let id = SMALL.submit(&coordinator);
@@ -91,9 +91,8 @@ fn a_copy_of_a_database_in_use_without_its_log_is_not_taken_for_the_whole() {
     SMALL.assert_undisturbed(restored.watch(id));
 }
 
-/// A database with a completed and a running experiment, in which a page is overwritten, or from
-/// which a tenth is cut off: every experiment that is not lost ends with the digest of an
-/// undisturbed run.
+/// Damages a database with a completed and a running experiment, and recovers it. Every experiment
+/// that is not lost ends with the digest of an undisturbed run.
 fn is_recovered(damage: impl FnOnce(&mut Vec<u8>)) {
     let mut coordinator = CoordinatorProcess::start();
     let workers = WorkerProcess::start_many(&coordinator, 2);
@@ -168,6 +167,6 @@ fn root_page(database: &[u8], table: &str) -> usize {
 }
 
 #[test]
-fn a_database_that_was_cut_off_is_recovered() {
+fn a_truncated_database_is_recovered() {
     is_recovered(|bytes| bytes.truncate(bytes.len() * 9 / 10));
 }

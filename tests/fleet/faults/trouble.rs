@@ -171,7 +171,7 @@ fn a_worker_killed_again_and_again_before_it_finishes_an_item_fails_nothing() {
             while !is_over.load(Relaxed) {
                 let mut worker = WorkerProcess::start(&coordinator, "mortal");
                 n_kills += 1;
-                // Its life begins when it can compute.
+                // The time to live begins when the worker can compute.
                 let joined = |line: &harness::LogLine| line["message"] == "worker joined";
                 n_seen = coordinator.process.find(n_seen, "the worker", joined).0;
                 thread::park_timeout(LIFE);
@@ -190,7 +190,7 @@ fn a_worker_killed_again_and_again_before_it_finishes_an_item_fails_nothing() {
 const LIFE: Duration = Duration::from_millis(100);
 
 #[test]
-fn workers_that_are_all_killed_at_once_while_copies_of_items_are_with_several_fail_nothing() {
+fn killing_all_workers_at_once_while_several_have_copies_of_an_item_fails_nothing() {
     let coordinator = CoordinatorProcess::start();
     let mut workers = WorkerProcess::start_many(&coordinator, 6);
     let id = SMALL.submit(&coordinator);
@@ -199,8 +199,8 @@ fn workers_that_are_all_killed_at_once_while_copies_of_items_are_with_several_fa
         for frozen in &workers[..2] {
             frozen.process.signal("STOP");
         }
-        // When a generation is incomplete although the others get no more items, they have copies
-        // of the items of these two.
+        // The frozen workers keep their generation incomplete. When the others get more items,
+        // these are copies of the frozen workers' items.
         let n_seen = coordinator.process.lines().len();
         coordinator.process.find(n_seen, "more work", |line| line["message"] == "items assigned");
         for worker in &mut workers {

@@ -10,7 +10,7 @@ fn a_worker_killed_within_a_generation_costs_nothing_but_time() {
     let mut workers = WorkerProcess::start_many(&coordinator, 3);
     let id = SMALL.submit(&coordinator);
 
-    // It has just got items that take tens of milliseconds.
+    // The worker has just got items that take tens of milliseconds.
     let (_, assigned) = wait_for_assignment(&coordinator, 2);
     let joined = coordinator.process.wait_for("that worker's name", |line| {
         line["message"] == "worker joined" && line["worker"] == assigned["worker"]
@@ -83,7 +83,7 @@ fn a_frozen_worker_is_not_missed_by_the_others() {
     wait_for_assignment(&coordinator, 1);
     sleeper.process.signal("STOP");
     let _other = WorkerProcess::start(&coordinator, "awake");
-    // It ends while one of its workers is frozen.
+    // The experiment ends while one of its workers is frozen.
     SMALL.assert_undisturbed(coordinator.watch(id));
     assert_eq!(wait_for_loss(&coordinator)["name"], "sleeper");
 }
