@@ -15,7 +15,7 @@ fn pages_in(text: &str) -> Vec<String> {
     mentions.collect()
 }
 
-/// The pages that files below a path name and that do not exist.
+/// The missing pages among those that the files below `path` name.
 fn missing(path: &Path, found: &mut usize) -> Vec<String> {
     if path.is_dir() {
         let names = fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path());

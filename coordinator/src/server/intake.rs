@@ -18,7 +18,8 @@ use crate::{
 
 /// Memory of a message relative to its length: a buffer that grew, and the decoded form.
 const COPIES: usize = 3;
-/// Bytes before a message: whether it is compressed, and its length.
+/// Bytes of the head before a message. The head says whether the message is compressed, and its
+/// length.
 const HEAD_LEN: usize = 5;
 
 /// Room for long messages.

@@ -16,7 +16,8 @@ use crate::{
     limits::{OUTFLOW_LEN_MAX, SHORT_LEN, WATCH_PATIENCE},
 };
 
-/// Bytes that the connection gets at once, and so holds for a peer that does not read.
+/// Bytes of a piece. The connection takes one piece at a time, and holds it if the peer does not
+/// read.
 const PIECE_LEN: usize = 32 << 10;
 
 /// Room for long answers.

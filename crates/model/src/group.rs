@@ -26,8 +26,8 @@ impl Membership {
 }
 
 /// Checks the name of a group. It has letters, digits, `-` and `_`, so that it differs from paths
-/// and addresses, and at least one character that is not a digit, so that it differs from numbers
-/// of experiments.
+/// and addresses. At least one character is not a digit, so that it differs from an experiment's
+/// number.
 pub fn check_name(name: &str) -> Result<(), String> {
     let is_plain = |c: char| c.is_alphanumeric() || "-_".contains(c);
     if name.len() > KEY_LEN_MAX || !name.chars().all(is_plain) {

@@ -24,14 +24,14 @@ pub const EXIT_STARVED: u8 = 71;
 const BLOCKING_MAX: usize = 32;
 /// Number of these threads that always exist.
 const BLOCKING_KEPT: usize = 2;
-/// Least pairs of file descriptors for the database, signals, connections and files, in addition to
-/// those at the program's start.
+/// Number of pairs of file descriptors that a program needs for the database, signals, connections
+/// and files, in addition to those at its start.
 const PIPES_MIN: usize = 12;
 /// Further pairs for each of up to [`PROCESSORS_MAX`] processors, because `run` has a worker on
 /// each.
 const PIPES_PER_PROCESSOR: usize = 2;
 const PROCESSORS_MAX: usize = 32;
-/// Least memory in addition to the stacks of threads, bytes.
+/// Memory that a program needs in addition to the stacks of threads, bytes.
 const MEMORY_MIN: usize = 64 << 20;
 /// Time for ended threads to disappear, ms.
 const GONE_TIME_MS: usize = 1000;

@@ -54,7 +54,7 @@ impl Audits {
         self.waiting.keys().any(|first| **first != *name && !doubted.contains_key(first))
     }
 
-    /// Takes the first audit that a worker of this name may do, of a worker that is not in doubt.
+    /// Takes the first audit for a worker of this name. Leaves out audits of workers in doubt.
     pub fn pop_for(&mut self, name: &str, doubted: &Doubted) -> Option<Item> {
         let mut waiting = self.waiting.iter_mut();
         let (first, items) =

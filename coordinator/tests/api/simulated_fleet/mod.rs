@@ -321,7 +321,7 @@ impl SimulatedFleet {
         Some(self.connect(Introduction { process, ..introduction }, speed, conduct, is_by_hand))
     }
 
-    /// The assignments that a worker that joined by hand has not computed.
+    /// The open assignments of a worker that joined by hand.
     pub fn held(&self, id: WorkerId) -> Vec<Assignment> {
         let queue = self.workers.get(&id).map(|worker| &worker.queue);
         queue.into_iter().flatten().map(|(_, assignment)| assignment.clone()).collect()

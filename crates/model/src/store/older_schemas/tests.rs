@@ -11,8 +11,8 @@ use super::super::{
     tests::new_experiment,
 };
 
-/// Replaces a directory's database by one of an older version, made by that version's own
-/// statements, with the same rows in the columns of that version.
+/// Replaces a directory's database by one of an older version. That version's own statements make
+/// it, and the same rows fill its columns.
 pub fn downgrade(directory: &Path, version: i64) {
     let path = file::path_in(directory);
     let latest = path.with_extension("latest");
