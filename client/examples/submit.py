@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Submits an experiment file to a coordinator and follows it to its end.
 
-Once: install what it needs, and generate the Python side of the protocol.
+First install the requirements, and generate the Python code of the protocol:
 
     pip install -r client/examples/requirements.txt
     python -m grpc_tools.protoc -I proto --python_out=client/examples \\
@@ -9,7 +9,7 @@ Once: install what it needs, and generate the Python side of the protocol.
 
     python client/examples/submit.py configs/quickstart.json --seed 7
 
-docs/clients.md explains it. Exit codes are those of swarmctl: docs/swarmctl.md.
+docs/clients.md explains this program. Its exit codes are those of swarmctl (docs/swarmctl.md).
 """
 
 import argparse
@@ -34,7 +34,7 @@ TRANSIENT = (
     StatusCode.UNAVAILABLE, StatusCode.DEADLINE_EXCEEDED,
     StatusCode.RESOURCE_EXHAUSTED, StatusCode.ABORTED,
 )
-# Of any other, 1.
+# All other errors exit with 1.
 EXIT_CODES = {
     StatusCode.INVALID_ARGUMENT: 2,
     StatusCode.NOT_FOUND: 3, StatusCode.FAILED_PRECONDITION: 3,
@@ -62,7 +62,7 @@ class Coordinator:
         if token and url.scheme != "https" and not is_here:
             raise ValueError("the token would be sent unencrypted; use https:// and --tls-ca")
         options = [
-            # Only pings tell a patient coordinator from a dead one.
+            # While a coordinator sends nothing, only pings show whether it is alive.
             ("grpc.keepalive_time_ms", 20_000),
             ("grpc.max_reconnect_backoff_ms", 2000),
             ("grpc.max_receive_message_length", 64 << 20),
@@ -159,7 +159,7 @@ def main() -> int:
     option("--generations", type=int, help="instead of the file's")
     option("--token-file", type=Path, help="or the token itself in SWARM_CLIENT_TOKEN")
     option("--tls-ca", type=Path, help="PEM file of the authority to trust [public ones]")
-    option("--request-id", default=str(uuid.uuid4()), help="the same id: the same experiment")
+    option("--request-id", default=str(uuid.uuid4()), help="a repeated id returns the same experiment")
     option("--patience", type=float, default=60, help="seconds to wait for the coordinator [60]")
     args = parser.parse_args()
     try:

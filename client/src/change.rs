@@ -61,8 +61,8 @@ pub struct SetArg {
     /// world.objects.robot.num_instances. VALUE is JSON or text; separators within quotes, lists
     /// and objects do not count. With several values, `run` and `submit` make a group with one run
     /// per combination, and `evaluate` makes one condition per combination; `fork` and `replay`
-    /// accept one value per path. The option may be repeated: `evaluate` then adds conditions for
-    /// each, and the other commands apply all changes together.
+    /// accept one value per path. If the option is repeated, `evaluate` adds conditions for each,
+    /// and the other commands apply all changes together.
     #[arg(long, value_name = "PATH=VALUE[,...][;...]")]
     pub set: Vec<String>,
 }
@@ -93,13 +93,13 @@ impl Change {
         split(text, ';').into_iter().map(axis).collect()
     }
 
-    /// Reads the same format, with one value per path.
+    /// Reads the format of [`Self::parse_axes`], with one value per path.
     pub fn parse_all(text: &str) -> Result<Vec<Self>, String> {
         let one = |axis: Vec<Self>| match <[Self; 1]>::try_from(axis) {
             Ok([change]) => Ok(change),
             Err(axis) => Err(format!(
-                "{}: takes one value here, and commas separate {}; put a text with commas in \
-                 double quotes, numbers in [ ]",
+                "{}: takes one value here, but commas separate {}; put a text with commas in \
+                 double quotes, and a list of numbers in [ ]",
                 axis[0].path,
                 axis.len()
             )),
@@ -107,7 +107,8 @@ impl Change {
         Self::parse_axes(text)?.into_iter().map(one).collect()
     }
 
-    /// Reads the same format; returns the changes for each combination of values.
+    /// Reads the format of [`Self::parse_axes`]; returns the changes for each combination of
+    /// values.
     pub fn parse_combinations(text: &str) -> Result<Vec<Vec<Self>>, String> {
         let axes = Self::parse_axes(text)?;
         let count = axes.iter().map(Vec::len).fold(1, usize::saturating_mul);
@@ -143,7 +144,7 @@ impl Change {
 }
 
 impl Change {
-    /// If the file lacks an object on the path: the place, and the problem.
+    /// The first object on the path that the file lacks, and the problem; none if all exist.
     pub fn missing(&self, file: &Json) -> Option<(String, String)> {
         let keys: Vec<&str> = self.path.split('.').collect();
         let mut place = file;
@@ -238,14 +239,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_change_is_refused() {
+    fn text_that_is_not_a_change_is_refused() {
         for text in ["", "d", "=3", "a.b=1;", "a.b.7=1", "a.b.x=1", "d.e=1"] {
             assert_eq!(applied(text).unwrap_err().lines().count(), 1, "{text}");
         }
     }
 
     #[test]
-    fn all_changes_without_a_place_are_named() {
+    fn every_change_without_a_place_is_named() {
         let problems = applied("a.b.7=1; d=2; d.e=1").unwrap_err();
         assert_eq!(problems, "a.b.7: there is no place `7`\nd.e: there is no place `e`");
     }
@@ -278,9 +279,9 @@ mod tests {
     }
 
     #[test]
-    fn several_values_are_refused_where_one_is_wanted() {
+    fn several_values_are_refused_in_the_place_of_one() {
         let refusal = applied("d=x,y").unwrap_err();
-        assert!(refusal.starts_with("d: takes one value here, and commas separate 2"), "{refusal}");
+        assert!(refusal.starts_with("d: takes one value here, but commas separate 2"), "{refusal}");
         assert_eq!(applied(r#"d="x,y""#).unwrap()["d"], json!("x,y"));
     }
 }

@@ -38,7 +38,7 @@ pub struct Args {
     pub command: Command,
 }
 
-/// Below the list of commands.
+/// The text below the list of commands.
 pub const EXAMPLES: &str = "\
 Examples:
   swarmctl validate experiments/*.json
@@ -48,11 +48,11 @@ Examples:
   swarmctl history 3 --output csv > history.csv
   swarmctl champion 3 > champion.json";
 
-/// Below the examples, on the long page.
+/// The text below the examples, on the long page of help.
 pub const MORE: &str = "\
-Options configure the connection to the coordinator, else environment variables,
-else the settings file. SWARM_CONFIG names that file; the default is
-~/.config/swarmevo/config.json. For example:
+The connection to the coordinator comes from options, else from environment
+variables, else from the settings file. SWARM_CONFIG names that file; the
+default is ~/.config/swarmevo/config.json. For example:
   {\"coordinator\": \"https://fleet.example:7700\", \"tls-ca\": \"ca.pem\",
    \"token-file\": \"client.token\"}
 

@@ -7,13 +7,13 @@ pub fn unix_ms() -> u64 {
     today().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64
 }
 
-/// The time, to compare dates with.
+/// The present time, to compare dates with.
 #[expect(clippy::disallowed_methods, reason = "ages are relative to now")]
 pub fn today() -> SystemTime {
     SystemTime::now()
 }
 
-/// The time, for measuring durations.
+/// The present time, to measure durations with.
 #[expect(clippy::disallowed_methods, reason = "speeds are measured from now")]
 pub fn now() -> Instant {
     Instant::now()
@@ -29,7 +29,7 @@ pub fn utc(at_ms: u64) -> String {
 }
 
 /// Year, month and day of a day after 1970-01-01: Howard Hinnant's
-/// `civil_from_days`, without the years before.
+/// `civil_from_days`, without the years before 1970.
 fn date(days: u64) -> (u64, u64, u64) {
     // Days since 0000-03-01: leap days come last.
     let days = days + 719_468;
@@ -71,8 +71,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn dates_are_those_of_the_calendar() {
-        // `date --utc --date=@SECONDS --iso-8601=seconds` says the same.
+    fn dates_agree_with_the_calendar() {
+        // `date --utc --date=@SECONDS --iso-8601=seconds` prints the same.
         for (seconds, expected) in [
             (0, "1970-01-01T00:00:00Z"),
             (951_782_399, "2000-02-28T23:59:59Z"),

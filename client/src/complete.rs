@@ -72,7 +72,7 @@ pub fn quarantined(word: &OsStr) -> Vec<CompletionCandidate> {
     offered(word, distrusted.map(|worker| (worker.name, worker.distrusted)).collect())
 }
 
-/// The same, and files.
+/// Completions of an experiment, a group or a file.
 pub fn experiments_and_files(word: &OsStr) -> Vec<CompletionCandidate> {
     let mut all = experiments(word);
     all.extend(PathCompleter::file().complete(word));
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_a_place_has_is_offered_wherever_it_is_meant() {
+    fn every_argument_that_names_something_stored_is_completed() {
         /// Values that are new, so nothing can complete them.
         const NEW: [&str; 3] = ["fork --name <NAME>", "new <NAME>", "slurm --job-name <NAME>"];
         /// Values from a file that the command line names.
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_names_and_groups_are_completed_and_names_of_several_are_not() {
+    fn numbers_groups_and_unambiguous_names_are_completed() {
         let run = |id, name: &str, group: &str| Experiment {
             id,
             name: name.into(),

@@ -37,7 +37,7 @@ use crate::{
 
 /// How long a request is repeated before the coordinator counts as unreachable.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The same, while a command follows an experiment.
+/// How long a request is repeated while a command follows an experiment.
 pub const PATIENCE_WHILE_FOLLOWING: Duration = Duration::from_secs(60);
 /// Time limit of a call that is not a stream.
 const CALL_TIMEOUT: Duration = Duration::from_secs(30);
@@ -59,7 +59,7 @@ enum Way {
 struct Here {
     data_dir: PathBuf,
     door: Door,
-    /// None if there are workers, too, and another owner stops everything.
+    /// None if another owner, which also has workers, stops the services.
     services: Option<InProcess>,
     /// Numbers of the experiments that this process has started.
     set_going: Mutex<Vec<u64>>,
@@ -141,7 +141,7 @@ impl Connection {
         Self { address, way, client, evaluations, fleet, patience: PATIENCE }
     }
 
-    /// Ends the services that were started for it.
+    /// Ends the services that this connection has started.
     pub async fn close(self) {
         let Self { way, client, evaluations, fleet, .. } = self;
         drop((client, evaluations, fleet));
@@ -198,7 +198,7 @@ impl Connection {
         }
     }
 
-    /// The same connection, with another time of repeating requests.
+    /// The same connection with another patience.
     pub fn with_patience(&self, patience: Duration) -> Self {
         Self { patience, ..self.clone() }
     }
@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn asking_another_service_says_so() {
+    async fn another_service_at_the_address_is_named() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         thread::spawn(move || {

@@ -23,7 +23,7 @@ pub struct Consent {
     dry_run: bool,
 }
 
-/// What the command does.
+/// The next action of the command.
 #[derive(Debug, PartialEq, Eq)]
 enum Next {
     /// It makes the changes.
@@ -62,8 +62,8 @@ impl Consent {
                 Ok(false)
             }
             Next::Refuse => Err(Error::Input(format!(
-                "`{what}` would change {n}, and cannot be undone: confirm it with --yes, or see \
-                 which with --dry-run"
+                "`{what}` would change {n}, and cannot be undone: confirm it with --yes, or list \
+                 them with --dry-run"
             ))),
             Next::Ask => {
                 progress.remark(&format!("{what} {n}? This cannot be undone. Type yes to go on:"));
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn several_experiments_are_asked_about_and_refused_where_nobody_can_answer() {
+    fn changes_of_several_experiments_need_an_answer() {
         let plain = Consent { yes: false, dry_run: false };
         assert_eq!(plain.next(1, false), Next::Do);
         assert_eq!(plain.next(2, true), Next::Ask);

@@ -30,7 +30,7 @@ pub enum Error {
         /// The problems, one per line.
         problems: String,
     },
-    /// This error came after some runs of a group were submitted.
+    /// An error after some runs of a group were submitted.
     #[error(
         "{n_submitted} of {n_runs} runs are submitted; repeat the command to submit the others: \
          {cause}"
@@ -287,7 +287,7 @@ pub fn is_transient(status: &Status) -> bool {
 
 /// The other servers that speak HTTP.
 const PORTS: &str = " Pages (--web-listen) and metrics (--metrics-listen) have ports of their \
-                     own; a coordinator's is 7700 unless its --listen is another one";
+                     own; the port of a coordinator is 7700, unless --listen sets another one";
 
 /// Whether an answer is HTTP but not gRPC, according to the messages of tonic.
 fn is_no_grpc(status: &Status) -> bool {
@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn exit_codes_of_what_happens_here() {
+    fn exit_codes_of_errors_in_this_process() {
         let failed = Error::Failed { id: 3, reason: "item 7".into() };
         assert_eq!(failed.exit_code(), 5);
         assert_eq!(failed.report(), "error: experiment 3 failed: item 7");
@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_that_a_closed_pipe_ends_says_so() {
+    fn a_command_ended_by_a_closed_pipe_says_so() {
         let error = Error::from_stdout(io::ErrorKind::BrokenPipe.into());
         assert_eq!(error.exit_code(), 141);
         assert!(error.report().starts_with("standard output is closed"), "{error}");

@@ -17,7 +17,7 @@ pub struct Example {
     alias: Option<&'static str>,
     /// The experiment file.
     pub config: &'static str,
-    /// Its script, unless its task is built in.
+    /// The script of its task, unless the task is built in.
     pub script: Option<&'static str>,
     /// The experiment, in a sentence.
     pub about: &'static str,
@@ -55,7 +55,7 @@ macro_rules! scripted {
     };
 }
 
-/// All of them, the quickest first, and those that take minutes last.
+/// All examples, from the quickest to those that take minutes.
 pub const EXAMPLES: [Example; 15] = [
     built_in!("quickstart", "", "leader", "Five robots agree on a leader by radio, in seconds"),
     scripted!("dispersion", "Robots spread out; they sense how near others are"),

@@ -110,7 +110,7 @@ impl ExperimentFile {
         let text = json::line(&file);
         match read(&text).map_err(without_lines) {
             Ok(_) => Ok(Self { path: self.path.clone(), text }),
-            // Problems of an object whose name is a mistake do not matter.
+            // If the name of an object is a mistake, other problems of that object do not matter.
             Err(mut error) => {
                 for (path, message) in missing {
                     error.problems.retain(|problem| !problem.path.starts_with(&path));
@@ -231,7 +231,7 @@ pub mod tests {
     }
 
     #[test]
-    fn a_request_carries_the_file_as_it_is_and_its_stem() {
+    fn a_request_carries_the_unchanged_file_and_its_stem() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("leader.selection.json");
         fs::write(&path, "{ \"seed\": 1 } // ü").unwrap();
@@ -288,7 +288,7 @@ pub mod tests {
     }
 
     #[test]
-    fn overrides_replace_what_the_file_says() {
+    fn overrides_replace_values_of_the_file() {
         let file = ExperimentFile::read(&quickstart()).unwrap();
         let overrides = Overrides {
             seed: Some(u64::MAX),
@@ -303,7 +303,7 @@ pub mod tests {
     }
 
     #[test]
-    fn changes_are_those_of_the_file_and_not_of_its_canonical_form() {
+    fn changes_apply_to_the_file_and_not_to_its_canonical_form() {
         let file = ExperimentFile::read(&quickstart()).unwrap();
         let original = Change::new("semantics".into(), Json::parse("original"));
         let changed = file.changed(&[original]).unwrap();
@@ -314,7 +314,7 @@ pub mod tests {
     }
 
     #[test]
-    fn all_that_changes_get_wrong_is_said_at_once() {
+    fn all_mistakes_of_changes_are_reported_at_once() {
         let file = ExperimentFile::read(&quickstart()).unwrap();
         let change = |path: &str, value| Change::new(path.into(), Json::parse(value));
         let wrong =
@@ -328,7 +328,7 @@ pub mod tests {
     }
 
     #[test]
-    fn a_change_of_an_object_that_is_not_there_names_those_that_are() {
+    fn a_change_of_an_unknown_object_names_the_known_ones() {
         let file = ExperimentFile::read(&quickstart()).unwrap();
         let path = "world.objects.robotA.num_instances".into();
         let error = file.changed(&[Change::new(path, Json::from(3))]).unwrap_err();

@@ -45,7 +45,7 @@ pub struct Script {
     /// The only experiment.
     pub experiment: Experiment,
     pub champion: Option<GetChampionResponse>,
-    /// Its events, from event 1 on without gaps.
+    /// The events of the experiment, from event 1 on without gaps.
     pub past: Vec<Event>,
     /// The answer to `Explain`, without the experiment.
     pub explanation: ExplainExperimentResponse,
@@ -414,7 +414,7 @@ impl ExperimentService for FakeCoordinator {
                 next_individual: None,
             }));
         }
-        // Two pages of one.
+        // Two pages of one individual each.
         let individuals = vec![individual(request.from_individual)];
         let next_individual = (request.from_individual == 0).then_some(1);
         Ok(Response::new(GetIndividualsResponse { individuals, next_individual }))
@@ -464,7 +464,7 @@ impl ExperimentService for FakeCoordinator {
             });
             completed.skip(request.from_generation as usize).collect()
         });
-        // Pages of one.
+        // Pages of one generation each.
         let generations: Vec<CompletedGeneration> = completed.pop_front().into_iter().collect();
         let next_generation = (!completed.is_empty()).then_some(request.from_generation + 1);
         Ok(Response::new(ListGenerationsResponse { generations, next_generation }))
@@ -476,7 +476,7 @@ impl ExperimentService for FakeCoordinator {
     ) -> Result<Response<ListEventsResponse>, Status> {
         let request = request.into_inner();
         self.experiment(request.experiment_id)?;
-        // Pages of one.
+        // Pages of one event each.
         let event = self.script(|script| {
             let wanted = |event: &&Event| event.sequence >= request.from_sequence;
             script.past.iter().find(wanted).cloned()

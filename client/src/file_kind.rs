@@ -151,7 +151,7 @@ impl Kind {
         let command = |words: &[&str]| {
             let path = path.to_string_lossy();
             let words = words.iter().map(|word| word.replace("{}", &path));
-            format!("take it with: {}", shell_command(words))
+            format!("use it with: {}", shell_command(words))
         };
         let directory = || {
             let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
@@ -159,7 +159,7 @@ impl Kind {
         };
         match self {
             Self::Experiment => command(&["swarmctl", "run", "{}"]),
-            Self::Script => "the experiment file that names it goes there".into(),
+            Self::Script => "give the experiment file that names it".into(),
             Self::Champion | Self::Genes => {
                 command(&["swarmctl", "replay", "--config", "EXPERIMENT.json", "--genotype", "{}"])
             }
@@ -244,7 +244,7 @@ mod tests {
         fs::write(&path, "PK\x03\x04").unwrap();
         let error = expect(&path, &[Kind::History], "a history").unwrap_err();
         let expected =
-            "it is a bundle, and a history is expected here; take it with: swarmctl import";
+            "it is a bundle, and a history is expected here; use it with: swarmctl import";
         assert!(error.contains(expected), "{error}");
         assert!(error.ends_with(r"it'\''s.zip'"), "for a shell: {error}");
         assert_eq!(expect(&path, &[Kind::Bundle], "a bundle"), Ok(()));

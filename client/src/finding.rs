@@ -62,7 +62,8 @@ impl fmt::Display for Finding {
 }
 
 impl Finding {
-    /// Adds the data directory to its next steps, whose commands would not find it.
+    /// Adds the data directory to the commands of the next steps, because they would not find it
+    /// by themselves.
     pub fn name_place(&mut self, data_dir: &str) {
         let lacks = |step: &&mut String| {
             step.contains(": swarmctl ")
@@ -105,7 +106,7 @@ pub fn stall(answer: &ExplainExperimentResponse, address: &str) -> Option<Findin
     let findings = findings(answer.experiment.as_ref()?, answer, address);
     let mut stall = findings.into_iter().find(|finding| finding.is_stall(held_ms))?;
     if stall.kind == Kind::Barrier {
-        // Its times advance although the situation is the same.
+        // The times in its text advance although the situation is the same.
         stall.what = "the last items of the generation take a long time".to_owned();
         let id = answer.experiment.as_ref().map_or(0, |experiment| experiment.id);
         stall.next_steps = vec![format!("see which workers have them: swarmctl explain {id}")];
@@ -339,8 +340,8 @@ fn of_round(
         findings.push(finding(Kind::Computing, what, look(round)));
     } else if round.items_queued == 0 && round.audits_waiting > 0 {
         let what = format!(
-            "waiting for a worker of another name to audit {}; without one, they are skipped after \
-             30 s",
+            "waiting for a worker of another name to audit {}; without one, the audit is skipped \
+             after 30 s",
             text::counted(round.audits_waiting.into(), "item"),
         );
         let steps = [format!("start another: worker --coordinator {address}")];
@@ -435,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_ended_or_is_paused_waits_for_nothing_else() {
+    fn an_ended_or_paused_experiment_waits_for_nothing_else() {
         for (state, kind) in [
             (ExperimentState::Completed, Kind::Ended),
             (ExperimentState::Failed, Kind::Ended),
@@ -483,7 +484,7 @@ mod tests {
     }
 
     #[test]
-    fn the_barrier_names_who_is_waited_for_and_since_when() {
+    fn the_barrier_names_the_last_workers_and_the_time_of_waiting() {
         let held = HeldItems { held_ms: 61_000, ..held(2) };
         let round = Round { generation: 5, held: vec![held], ..Round::default() };
         let answer = ExplainExperimentResponse { round: Some(round), ..healthy() };

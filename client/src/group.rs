@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_coordinator_that_is_gone_is_not_asked_ten_thousand_times() {
+    async fn an_unreachable_coordinator_stops_the_changes() {
         let change = async |id| match id {
             1 => Ok(id),
             2 => Err(Error::Denied { address: "x".into(), refusal: "y".into() }),
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn the_error_of_one_alone_is_said_as_it_is() {
+    async fn a_single_error_is_reported_unchanged() {
         let change = async |_| Err::<u64, _>(Error::NotFound("it has not ended".into()));
         let error = change_each(&group(1), &mut quiet(), change).await.end().unwrap_err();
         assert_eq!(error.report(), "error: it has not ended");

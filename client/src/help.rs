@@ -15,7 +15,7 @@ use crate::{
 
 /// The option that shows all options.
 const ALL: &str = "--help-all";
-/// Commands that work on a directory only, or create one: they show its option.
+/// Commands that work only on a data directory, or create one: their help shows --data-dir.
 const ON_A_DIRECTORY: [&str; 4] = ["backup", "doctor", "run", "web"];
 
 /// Commands of one purpose: a family of requests, and the commands before and after it in the
@@ -82,7 +82,7 @@ pub fn matches() -> Result<ArgMatches, Error> {
     matches_of(env::args_os().collect(), None)
 }
 
-/// Reads a command line; its help has the width of the terminal, or another.
+/// Reads a command line. `width`: the width of the help; none: that of the terminal.
 fn matches_of(line: Vec<OsString>, width: Option<usize>) -> Result<ArgMatches, Error> {
     let line = with_words_of_help(line);
     let mut options = line.iter().take_while(|word| *word != "--");

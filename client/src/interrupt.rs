@@ -1,6 +1,6 @@
 //! SIGINT and SIGTERM: the first signal requests an orderly end, the second ends the process at
-//! once. Without code that waits for an orderly end, the first one ends the process at once.
-//! Neither leaves unfinished files.
+//! once. If no code waits for an orderly end, the first signal ends the process at once.
+//! Neither signal leaves unfinished files.
 
 use std::{
     fs, io,
@@ -35,7 +35,7 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 pub struct Unfinished(PathBuf);
 
 impl Unfinished {
-    /// Creates and registers it before a signal can be handled.
+    /// Creates and registers a file or directory before a signal can be handled.
     pub fn make<T>(
         make: impl FnOnce() -> io::Result<T>,
         path: impl FnOnce(&T) -> &Path,
@@ -59,8 +59,8 @@ fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends the process at once, and removes unfinished files. The lock prevents new ones
-/// meanwhile.
+/// Ends the process at once, and removes unfinished files. The lock prevents new
+/// unfinished files meanwhile.
 fn end() -> ! {
     let all = unfinished();
     for path in all.iter() {
@@ -73,8 +73,8 @@ fn end() -> ! {
 /// Makes the first signal end the process like [`end`], unless code waits for an orderly end.
 fn listen_for_the_end() {
     static ONCE: Once = Once::new();
-    // Without a runtime, there is no command; a runtime without threads handles no signal while it
-    // computes.
+    // Without a runtime, no command runs. A runtime of one thread handles no signal while that
+    // thread computes.
     let runtime = Handle::try_current();
     let runtime =
         runtime.ok().filter(|runtime| runtime.runtime_flavor() != RuntimeFlavor::CurrentThread);

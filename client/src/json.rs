@@ -67,7 +67,7 @@ pub struct GenerationLine<'a> {
     summary: &'a GenerationSummary,
 }
 
-/// The message, with its keys in this order.
+/// The fields of the message, in the order of the printed keys.
 #[derive(Serialize)]
 #[serde(remote = "GenerationSummary")]
 struct GenerationFields {
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_champion_is_worth_stays_apart_from_what_selected_it() {
+    fn judged_and_selection_fitness_stay_apart() {
         let held_out = HeldOutFitness { mean: 1.5, ci95: 0.125, trials: 50, generation: 9 };
         let judged =
             JudgedFitness { mean: 1.0, low: 0.75, high: 1.125, trials: 200, generation: 9 };
@@ -389,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn a_champion_contains_its_network_and_what_it_was_evolved_with() {
+    fn a_champion_contains_its_network_and_its_experiment() {
         let champion = champion();
         let experiment = Experiment {
             name: "leader".into(),

@@ -85,8 +85,8 @@ fn main() -> ExitCode {
     error.exit_code().into()
 }
 
-/// The program that a command line selects, unless it is `swarmctl`, and its arguments: by the
-/// name of this file, or, if the file has one name only, by the first word.
+/// The program that a command line selects, with its arguments; none for `swarmctl`. The name of
+/// this file selects the program, or else the first word after it.
 fn other_program(words: Vec<OsString>) -> Option<(Program, Vec<OsString>)> {
     let named = |word: &OsString| PROGRAMS.iter().find(|(name, _)| *word == **name);
     let called = words.first().and_then(|word| Path::new(word).file_stem());

@@ -111,7 +111,7 @@ impl Overwrite {
         let failed = |error: io::Error| unwritable(to, &error);
         let is_same = fs::canonicalize(from).ok() == fs::canonicalize(to).ok();
         if is_same {
-            return Err(failed(io::Error::other("it is the directory that is read")));
+            return Err(failed(io::Error::other("it is the directory that the command reads")));
         }
         if let Some(holder) = store::holder(to) {
             return Err(failed(io::Error::other(format!("{holder} uses it"))));
@@ -119,13 +119,14 @@ impl Overwrite {
         let (aside, unfinished) = unfinished_directory(parent(to)).map_err(failed)?;
         let [new, old] = ["new", "old"].map(|name| aside.path().join(name));
         let made = make(&new)?;
-        // From here on, the only copy of the replaced directory may be there.
+        // From here on, `aside` may have the only copy of the replaced directory, so a signal must
+        // not remove it.
         drop(unfinished);
         if store::is_in(&new) {
             fs::rename(to, &old).map_err(failed)?;
             if let Err(error) = fs::rename(&new, to) {
                 let Err(back) = fs::rename(&old, to) else { return Err(failed(error)) };
-                // Otherwise it would be removed with its parent directory.
+                // Otherwise the earlier directory would be removed with `aside`.
                 let kept = aside.keep().join("old");
                 let what = format!("{back}; the earlier directory is in {}", kept.display());
                 return Err(failed(io::Error::other(what)));

@@ -64,9 +64,9 @@ pub enum Place {
 }
 
 impl Place {
-    /// The place that the command line names, else the environment, else the settings file; else
-    /// the coordinator at the default address if it listens, else the default data directory if
-    /// it exists.
+    /// Finds the place of experiments. The first of these counts: the command line, the
+    /// environment, the settings file, a coordinator that listens at the default address, the
+    /// default data directory if it exists.
     pub async fn find(settings: Settings) -> Result<Self, Error> {
         match Self::named(settings)? {
             Self::Coordinator(settings) if settings.coordinator.is_none() => {

@@ -49,7 +49,7 @@ const BAR_WIDTH: usize = 26;
 pub struct Progress {
     format: OutputFormat,
     stdout: Box<dyn Write + Send>,
-    /// The reason why it is closed, if it is.
+    /// The reason why standard output is closed, if it is.
     unwritten: Unwritten,
     /// The reaction to a closed standard output.
     when_closed: WhenClosed,
@@ -94,7 +94,7 @@ enum WhenClosed {
     GoOn,
     /// The reader has gone; the work continues.
     HasGone,
-    /// It ends, because it would only print for as long as an experiment takes.
+    /// It ends, because printing is its only work.
     End,
 }
 

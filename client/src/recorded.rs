@@ -41,7 +41,7 @@ pub struct Run {
     pub points: Vec<GenerationFitness>,
 }
 
-/// The fitness of a generation: a row of the file, too.
+/// The fitness of a generation, which is also a row of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct GenerationFitness {
     pub generation: u64,
@@ -109,7 +109,7 @@ impl Run {
         let generations: Vec<GenerationFitness> =
             reader.deserialize().collect::<Result<_, _>>().map_err(|error| {
                 problem(format!(
-                    "{}; expected what `swarmctl history ID --output csv` writes",
+                    "{}; expected the output of `swarmctl history ID --output csv`",
                     plain(&error)
                 ))
             })?;

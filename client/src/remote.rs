@@ -5,17 +5,17 @@ use crate::{connection::Connection, error::Error, place::Intent, progress::Progr
 /// A command, or a family of commands, that only sends requests to a coordinator, so that an
 /// interrupt may end it at any time.
 pub trait Remote: Sized {
-    /// Whether its answer is a table, which can be printed as CSV.
+    /// Whether the answer of the command is a table, which can be printed as CSV.
     fn has_table(&self) -> bool {
         false
     }
 
-    /// Whether it ends when the reader of standard output goes.
+    /// Whether the command ends when the reader of standard output goes.
     fn ends_with_reader(&self) -> bool {
         false
     }
 
-    /// Its kind of access to experiments.
+    /// The kind of access of the command to experiments.
     fn intent(&self) -> Intent {
         Intent::Read
     }

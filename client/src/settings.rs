@@ -123,7 +123,7 @@ impl Settings {
     }
 
     /// These settings, completed from `others`. Ignores `others` if they name another
-    /// coordinator: this one must not see its token.
+    /// coordinator, so that no coordinator sees the token of another one.
     fn or(self, others: Self) -> Self {
         if self.coordinator.is_some() && self.address() != others.address() {
             return self;
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_variable_is_one_that_is_not_set() {
+    fn an_empty_variable_counts_as_unset() {
         let file = settings(Some("http://file:1"));
         assert_eq!(settings(Some("")).without_empty().or(file.clone()), file);
     }
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_token_is_for_its_coordinator_only() {
+    fn a_token_reaches_only_its_coordinator() {
         let file = Settings { token_file: Some("secret".into()), ..settings(Some("http://a:1")) };
         assert_eq!(settings(Some("http://b:1")).or(file).token_file, None);
         let file = Settings { token_file: Some("secret".into()), ..settings(None) };

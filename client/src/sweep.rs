@@ -189,7 +189,7 @@ fn variants(set: &[String], n_max: usize) -> Result<Vec<Variant>, Error> {
             variant
         };
         if variants.len() * axis.len() > n_max {
-            let message = format!("these are more than {RUNS_MAX} runs, the most of a group");
+            let message = format!("these are more than {RUNS_MAX} runs, the maximum of a group");
             return Err(Error::Input(message));
         }
         variants = variants

@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn other_words_lead_to_the_command_that_is_meant() {
+    fn other_words_lead_to_the_intended_command() {
         for (word, command) in [("stop", "`cancel`"), ("status", "`list`"), ("best", "`champion`")]
         {
             let answer = answer(word);
@@ -93,20 +93,20 @@ mod tests {
     }
 
     #[test]
-    fn a_file_where_an_experiment_is_expected_is_said_to_be_one() {
+    fn a_file_in_the_place_of_an_experiment_is_recognised() {
         let file = crate::experiment_file::tests::quickstart();
         for line in [["watch", file.to_str().unwrap()], ["replay", file.to_str().unwrap()]] {
             let error = Args::try_parse_from(["swarmctl"].iter().chain(&line)).unwrap_err();
             let answer = with_suggestions(error).to_string();
             assert!(
-                answer.contains("is an experiment file; take it with: swarmctl run"),
+                answer.contains("is an experiment file; use it with: swarmctl run"),
                 "{answer}"
             );
         }
     }
 
     #[test]
-    fn negative_numbers_are_values_and_are_refused_as_such() {
+    fn negative_numbers_are_refused_as_values() {
         for line in ["run a.json --seed -1", "simulate 1 --trials -3", "evaluate 1 --robots -3"] {
             let line = format!("swarmctl {line}");
             let error = crate::help::definition_for_tests().try_get_matches_from(line.split(' '));

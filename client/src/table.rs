@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_has_what_is_nested() {
+    fn csv_has_nested_values() {
         let record = json!({
             "labels": {"user": "ada", "for": "a, b"},
             "changes": ["-x=1", "y=2"],
@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_keeps_bits_and_quotes_what_needs_it() {
+    fn csv_keeps_bits_and_quotes_text_where_necessary() {
         let records = [json!({"n": 0.1 + 0.2, "s": "a, \"b\""}), json!({"n": null, "s": "c"})];
         let expected = "s,n\n\"a, \"\"b\"\"\",0.30000000000000004\nc,";
         assert_eq!(csv(&["s", "n"], &records), expected);

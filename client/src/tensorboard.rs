@@ -1,7 +1,7 @@
 //! Event files of TensorBoard: a file of TFRecords, each an `Event`.
 //!
-//! Only scalars are written, so these are the few fields of `event.proto` and `summary.proto`
-//! of TensorFlow that they need.
+//! This module writes only scalars, so it declares only the fields of TensorFlow's
+//! `event.proto` and `summary.proto` that scalars need.
 
 use crc32c::crc32c;
 use prost::Message;

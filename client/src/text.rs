@@ -129,8 +129,8 @@ pub fn under_another_name(old: &str, name: &str) -> Option<String> {
     (old != name).then(|| format!("it was computed under the name `{}`", escape(old)))
 }
 
-/// The remark about a submission that is identical to an experiment; `identical`: the number of
-/// that one, 0 for none; `names`: its name and that of the file, if both are known.
+/// The remark about a submission that is identical to an experiment. `identical`: the number of
+/// that experiment, 0 for none; `names`: its name and the name in the file, if both are known.
 pub fn identical(
     submitted: &Experiment,
     identical: u64,
@@ -320,7 +320,7 @@ pub fn fitting(text: &str, width: Option<usize>) -> String {
     width.map_or_else(|| text.to_owned(), |width| wrapped(text, width))
 }
 
-/// The message that a data directory has no workers, and which program uses it.
+/// The message that a data directory has no workers, with the program that uses it.
 pub fn no_fleet(data_dir: &Path, holder: Option<&Holder>) -> String {
     let data_dir = data_dir.display();
     match holder {

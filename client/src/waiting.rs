@@ -116,18 +116,18 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_long_wait_is_said_after_two_seconds_and_again() {
+    async fn a_long_wait_is_reported_after_two_seconds_and_again() {
         assert_eq!(said(1).await, []);
         let line = || "waiting for it".to_owned();
         assert_eq!(said(40).await, [(2, line()), (32, line())]);
     }
 
     #[test]
-    fn long_work_is_said_and_short_work_is_not() {
+    fn only_long_work_is_reported() {
         let (heard, hear) = mpsc::channel();
         let heard = Mutex::new(heard);
         let say = |line: &str| heard.lock().unwrap().send(line.to_owned()).unwrap();
-        // It ends after its first message.
+        // The work ends after its first message.
         let long = busy_to(&say, Duration::ZERO, "reading it", || hear.recv().unwrap());
         assert_eq!(long, "reading it");
         assert_eq!(busy_to(&say, Duration::MAX, "reading it", || 7), 7);

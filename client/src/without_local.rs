@@ -118,7 +118,7 @@ pub mod services {
         }
     }
 
-    /// As it is.
+    /// The unchanged error.
     pub fn refused(error: Error) -> Error {
         error
     }

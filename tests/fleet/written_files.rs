@@ -88,7 +88,7 @@ fn force_replaces_data_directories_that_nobody_uses_and_nothing_else() {
     assert_eq!(files(&directory.path().join("thesis")).len(), 1);
     let itself = directory.swarmctl("backup swarm-data --force");
     assert_eq!(itself.code, Some(2), "{itself:#?}");
-    assert!(itself.stderr.contains("the directory that is read"), "{}", itself.stderr);
+    assert!(itself.stderr.contains("the directory that the command reads"), "{}", itself.stderr);
     directory.swarmctl("history 1").expect_success();
 }
 

@@ -18,9 +18,9 @@ use crate::{
 
 /// Copy a data directory, even while a coordinator uses it.
 ///
-/// The copy is a snapshot of one moment. The command checks it like `doctor`, and it
-/// appears only when complete. A coordinator on the copy continues every experiment from
-/// that moment, to the same bits.
+/// The copy is a snapshot of one moment. The command checks the copy like `doctor`. The
+/// copy appears only when it is complete. A coordinator on the copy continues every experiment
+/// from that moment, to the same bits.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct BackupArgs {
@@ -48,7 +48,7 @@ pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Re
     });
     match copied? {
         Backup::Made(mut inspection) => {
-            // The copy was made beside the directory that it has replaced.
+            // The inspection has the path at which the copy was made, before it was moved.
             inspection.path =
                 args.to.join(inspection.path.file_name().expect("a database has a name"));
             print_inspection(&inspection, progress)?;
@@ -75,7 +75,7 @@ pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Re
     }
 }
 
-/// The error of making a data directory.
+/// The error that a data directory cannot be made.
 pub fn refused(error: &StoreError) -> Error {
     match error {
         StoreError::NotEmpty { path } => exists(path),

@@ -61,7 +61,8 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
     };
     let duration = Duration::from_secs(args.seconds.into());
     let n_trials = config.algorithm.num_evaluations;
-    let what = format!("simulating on {n_cores} cores for {} s; --seconds has fewer", args.seconds);
+    let what =
+        format!("simulating on {n_cores} cores for {} s; --seconds shortens this", args.seconds);
     let speed = waiting::busy(&what, || {
         thread::scope(|scope| {
             let simulate = |core| {

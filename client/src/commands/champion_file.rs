@@ -1,4 +1,4 @@
-//! The file with the champion of an experiment that `run` computed, in the data
+//! Writes the champion of an experiment that `run` has computed to a file in the data
 //! directory.
 
 use std::path::{Path, PathBuf};
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn a_champion_is_stored_as_it_is_printed() {
+    fn a_stored_champion_equals_the_printed_one() {
         let dir = tempfile::tempdir().unwrap();
         let champion = GetChampionResponse {
             experiment_id: 3,

@@ -1,4 +1,4 @@
-//! `swarmctl compare`: samples of runs against each other.
+//! `swarmctl compare`: compares samples of runs.
 
 mod report;
 mod samples;
@@ -30,7 +30,7 @@ use self::{
 
 /// Default number of last generations to average in each run.
 const LAST: u64 = 50;
-/// Points of a curve: an interval costs ten thousand draws.
+/// Maximum number of points of a curve: the interval of each costs ten thousand draws.
 const POINTS_MAX: usize = 200;
 
 /// Compare groups of runs: how good each is, which is better, and how certain that is.

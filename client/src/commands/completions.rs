@@ -14,8 +14,8 @@ pub struct CompletionsArgs {
 }
 
 const HELP: &str = "\
-The following script also completes numbers and names of experiments, from the
-coordinator of the environment or the settings file:
+The following line also completes numbers and names of experiments. It requests
+them from the coordinator of the environment or the settings file:
   source <(COMPLETE=bash swarmctl)                # in ~/.bashrc; also zsh, fish
 
 Examples:

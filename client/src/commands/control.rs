@@ -32,7 +32,7 @@ family! {
     }
 }
 
-/// Pause an experiment, or a group: workers get no items of it until it is resumed.
+/// Pause an experiment, or a group: workers get none of its items until you resume it.
 ///
 /// It stays paused when the coordinator restarts; `swarmctl resume` continues it.
 /// A pause changes no bit of the results.
@@ -71,16 +71,16 @@ impl Remote for PauseArgs {
 /// Continue a paused, failed or cancelled experiment, or a group, or extend a completed one.
 ///
 /// An experiment continues from its last stored generation, to the same bits as if it had never
-/// stopped. Of a group, the command continues paused and failed experiments; give the number of a
-/// cancelled one. With --generations, it extends completed experiments: generations,
-/// re-evaluations, champion and digests become those of a run that had the new length from the
-/// start, and the champion is judged again at the new end, on other trials. An experiment that
-/// has reached its target fitness cannot be extended: `fork` continues it under another target.
+/// stopped. Of a group, the command continues paused and failed experiments; to continue a
+/// cancelled one, give its number. With --generations, it extends completed experiments:
+/// generations, re-evaluations, champion and digests become those of a run that had the new length
+/// from the start, and the champion is judged again at the new end, on other trials. An experiment
+/// that has reached its target fitness cannot be extended: `fork` continues it under another target.
 #[derive(Debug, Args)]
 pub struct ResumeArgs {
     #[command(flatten)]
     target: Target,
-    /// Total number of generations, from the first, to extend completed experiments.
+    /// Extend completed experiments to this total number of generations.
     #[arg(long, value_name = "G", value_parser = whole(1..=limits::GENERATIONS))]
     generations: Option<u64>,
 }
@@ -234,7 +234,7 @@ pub fn print(
     print_of(target, outcome, |experiment| experiment, line, progress)
 }
 
-/// The same, for answers that contain an experiment.
+/// Like [`print`], for answers that contain an experiment.
 pub fn print_of<T>(
     target: &Target,
     outcome: Outcome<T>,

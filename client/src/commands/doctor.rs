@@ -13,9 +13,9 @@ use crate::{error::Error, json, output_file::Overwrite, progress::Progress, text
 /// Check the database of a data directory, or recover the sound part of a damaged one.
 ///
 /// The command reads the whole database and never writes to it; a coordinator may use it
-/// meanwhile. It prints each damage with the next step. It checks the structure of the
-/// database, the seals of configurations, generations, checkpoints and champions, and
-/// that these continue each other.
+/// meanwhile. It checks the structure of the database, the seals of configurations,
+/// generations, checkpoints and champions, and that these form an unbroken sequence. It
+/// prints each damage with the next step.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct DoctorArgs {

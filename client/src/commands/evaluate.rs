@@ -171,7 +171,7 @@ async fn compute_here(
     result
 }
 
-/// The error that there is no coordinator, with the alternative.
+/// Adds the alternative to the error that no coordinator answers.
 fn or_here(error: Error) -> Error {
     match error {
         Error::Unreachable { address, reason } => {

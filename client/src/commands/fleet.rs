@@ -147,7 +147,7 @@ async fn scale(
     let mut lives = Lives::new(slurm.idle_timeout);
     if !progress.is_json() {
         progress.remark(&format!(
-            "jobs are named {}; one worker for {ITEMS_PER_WORKER} open items, {} to {}",
+            "jobs are named {}; one worker for {ITEMS_PER_WORKER} open items, {} to {} workers",
             slurm.job_name, bounds.min, bounds.max
         ));
     }
@@ -275,7 +275,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn jobs_that_end_at_once_are_not_submitted_for_ever() {
+    fn jobs_that_end_at_once_are_submitted_only_a_few_times() {
         let mut lives = Lives::new(2 * SHORT_LIFE);
         let mut now = Instant::now();
         let mut run = |id: &str, lasts: Duration, is_told: bool| {

@@ -41,7 +41,7 @@ family! {
     }
 }
 
-/// Why a command for ended experiments applies to none of a group.
+/// The error of a command for ended experiments if a group has none.
 const NONE_HAS_ENDED: &str = "no experiment of group `NAME` has ended";
 
 /// Delete an ended experiment, or those of a group, with all their data.
@@ -126,7 +126,7 @@ impl Remote for PruneArgs {
 pub struct ArchiveArgs {
     #[command(flatten)]
     target: Target,
-    /// Take it out of the archive.
+    /// Take the experiment out of the archive.
     #[arg(long)]
     restore: bool,
 }
@@ -254,7 +254,7 @@ mod tests {
     use crate::{experiment_file::tests::quickstart, place::Place};
 
     #[tokio::test(flavor = "multi_thread")]
-    async fn forks_are_deleted_before_what_they_share_generations_with() {
+    async fn forks_are_deleted_before_their_parents() {
         let temporary = tempfile::tempdir().unwrap();
         let path = temporary.path().join("data");
         let at = ["--data-dir", path.to_str().unwrap()];

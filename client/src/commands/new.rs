@@ -48,7 +48,10 @@ const PARTS: [(&str, &str); 4] = [
 fn name(text: &str) -> Result<String, String> {
     match group::check_name(text) {
         Ok(()) if !text.is_empty() && !text.starts_with('-') => Ok(text.to_owned()),
-        _ => Err("a name has letters, digits, - and _, and a letter in it, as my-task has".into()),
+        _ => Err(
+            "a name has letters, digits, - and _, at least one of them a letter, such as my-task"
+                .into(),
+        ),
     }
 }
 

@@ -108,7 +108,7 @@ impl Remote for WaitArgs {
     }
 }
 
-/// Like `watch --events --so-far`, or without --so-far.
+/// Like `watch --events --so-far`; with --follow like `watch --events`.
 #[derive(Debug, Args)]
 pub struct LogsArgs {
     /// Number or name of the experiment, or name of a group [default: all, in the order of

@@ -17,11 +17,11 @@ use worker::WorkerConfig;
 use super::execute;
 use crate::{cli::Args, experiment_file::tests::quickstart, progress::tests::Captured};
 
-/// A time limit beyond that of any command here, even on a busy machine.
+/// A time limit that no command here reaches, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Commands that only read experiments, or change stored ones. TO is a file, which must be
-/// equal, too.
+/// Commands that only read experiments, or change stored ones. TO stands for a file, whose
+/// content must be equal, too.
 const ASKED: &[&str] = &[
     "list",
     "list --output json",
@@ -235,7 +235,8 @@ impl Fleet {
     }
 }
 
-/// Runs the line in a place that has its own file names; returns the written files, too.
+/// Runs the line in a place, and returns its output and the files that it wrote. `name`: the
+/// file of this place for TO.
 async fn output_at(line: &str, place: &[&str], directory: &Path, name: &str) -> (String, Vec<u8>) {
     let to = directory.join(name);
     let file = quickstart().display().to_string();
@@ -254,7 +255,7 @@ async fn output_at(line: &str, place: &[&str], directory: &Path, name: &str) -> 
     (text, written)
 }
 
-/// A list without ages, which a second between two questions changes.
+/// A list without ages, which may differ between two requests.
 fn without_ages(list: &str) -> String {
     let words: Vec<&str> = list.split_whitespace().collect();
     let is_unit = |word: Option<&&str>| matches!(word, Some(&("ms" | "s" | "min")));
@@ -323,7 +324,7 @@ fn no_command_is_forgotten() {
 }
 
 #[tokio::test]
-async fn what_nobody_computes_is_not_waited_for() {
+async fn an_experiment_that_no_program_computes_is_not_waited_for() {
     let temporary = tempfile::tempdir().unwrap();
     let path = data_dir(temporary.path()).await;
     let at = ["--data-dir", path.to_str().unwrap()];
@@ -361,7 +362,7 @@ async fn a_directory_in_use_is_read_and_not_changed() {
 }
 
 #[tokio::test]
-async fn a_directory_that_is_not_there_is_made_by_what_adds_to_it_alone() {
+async fn only_commands_that_add_experiments_create_a_missing_directory() {
     let temporary = tempfile::tempdir().unwrap();
     let path = temporary.path().join("none");
     let at = ["--data-dir", path.to_str().unwrap()];

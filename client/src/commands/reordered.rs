@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[tokio::test(flavor = "multi_thread")]
-    async fn the_same_file_in_another_order_is_said_to_be_so_and_another_file_is_not() {
+    async fn a_reordered_file_is_remarked_on_and_another_file_is_not() {
         let temporary = tempfile::tempdir().unwrap();
         let data = temporary.path().join("data");
         let text = fs::read_to_string(quickstart()).unwrap();

@@ -165,12 +165,12 @@ fn judged_trial(trials: &Trials, n: u32, wanted: Option<u32>) -> Result<(u32, St
             let last = n.saturating_sub(1);
             return Err(Error::Input(format!("--judged {trial}: the trials are 0 to {last}")));
         }
-        return Ok((trial, format!("playing trial {trial} of the {n} that judged it")));
+        return Ok((trial, format!("playing trial {trial} of the {n} that judged the champion")));
     }
     let trial = trials.median();
     let value = trials.fitness(trial);
     let what = format!(
-        "playing trial {trial} of the {n} that judged it, the median: fitness {}; \
+        "playing trial {trial} of the {n} that judged the champion, the median: fitness {}; \
          others: --judged N, or --trial N of its generation",
         text::number(value, 6)
     );
@@ -226,8 +226,8 @@ impl ReplayArgs {
         Ok(Subject { file, genotype: Genotype::found(address, found), generation, judged })
     }
 
-    /// The genotype, for readers of the file: only the name of a path, because the path is
-    /// of this machine.
+    /// The source of the genotype, for readers of the file. Leaves out the directories of a
+    /// path, which only this machine has.
     fn title(&self, genotype: &Genotype) -> String {
         match self.genotype.as_deref().and_then(Path::file_name) {
             Some(name) => format!("genotype in {}", name.display()),

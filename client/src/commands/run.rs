@@ -66,8 +66,8 @@ pub struct RunArgs {
 const PAGES: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
 const HELP: &str = "\
-With --output json it prints a line per generation (numbered from 0), then one
-with state, digest and champion.
+With --output json, the command prints a line per generation (numbered from 0),
+then a line with state, digest and champion.
 
 Examples:
   swarmctl run --example quickstart
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn what_exists_is_said_with_what_else_can_be_wanted() {
+    fn an_existing_result_is_reported_with_the_alternatives() {
         let text = already_completed(&Experiment { seed: u64::MAX, ..experiment(3, "a") }, "a");
         for part in ["experiment 3 (a)", "--generations 80", "--seed 0", "--new"] {
             assert!(text.contains(part), "{text}");
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_computed_under_another_name_is_said_with_the_way_to_the_new_one() {
+    fn a_result_under_another_name_is_reported_with_the_way_to_the_new_name() {
         let text = already_completed(&experiment(3, "old"), "new");
         let expected = "it was computed under the name `old`; under `new`: --new";
         assert!(text.contains(expected), "{text}");
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn continuing_is_said_and_so_is_company() {
+    fn continued_and_other_unfinished_experiments_are_remarked_on() {
         let unfinished = [experiment(2, "b"), experiment(3, "a")];
         let lines = remarks(&[experiment(3, "a")], &unfinished);
         assert_eq!(lines[0], "continuing experiment 3 (a), 12 of 40 generations done");

@@ -44,8 +44,9 @@ pub async fn simulate(
         }
         None => None,
     };
-    let trials =
-        waiting::busy("computing the trials; --trials has fewer, --steps shorter ones", || {
+    let trials = waiting::busy(
+        "computing the trials; --trials reduces their number, --steps their length",
+        || {
             let mut trials = Vec::new();
             for trial in 0..compiled.config.algorithm.num_evaluations {
                 let observe: &mut dyn FnMut(&_) = match &mut trace {
@@ -58,7 +59,8 @@ pub async fn simulate(
                 trials.push(Trial { trial, summary });
             }
             Ok::<_, Error>(trials)
-        })?;
+        },
+    )?;
     let n_rows = trace.map(Trace::finish).transpose()?;
     let report = SimulationReport {
         name: &compiled.config.name,
@@ -93,8 +95,8 @@ async fn subject(
     if let Some(address) = args.address() {
         if args.genotype.is_some() || args.experiment.is_some() {
             return Err(Error::Input(format!(
-                "no file `{address}` exists, and the address of a genotype stands alone; --genotype \
-                 and --experiment go with an experiment file"
+                "no file `{address}` exists; if it is the address of a genotype, leave out \
+                 --genotype and --experiment, which need an experiment file"
             )));
         }
         let connection = Connection::open(settings, Intent::Read, progress).await?;

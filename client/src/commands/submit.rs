@@ -28,9 +28,9 @@ family! {
 
 /// Submit an experiment, or a group of runs of it, to the coordinator.
 ///
-/// The runs of a group share the fleet: while one waits for the last items of its
-/// generation, workers compute others. If you repeat the command, it submits only the
-/// runs that the group lacks.
+/// The runs of a group share the fleet: while one run waits for the last items of its
+/// generation, workers compute items of other runs. If you repeat the command, it submits
+/// only the runs that the group lacks.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct SubmitArgs {
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn an_identical_experiment_of_another_name_is_said_to_be_so() {
+    fn an_identical_experiment_of_another_name_is_remarked_on() {
         let submitted = Experiment { id: 3, ..Experiment::default() };
         let said = |identical, reuse, name| {
             text::identical(&submitted, identical, reuse, Some(("old", name))).unwrap()
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_group_that_is_submitted_again_is_asked_for_under_the_same_ids() {
+    async fn a_repeated_group_is_submitted_under_the_same_ids() {
         let (fake, connection) = FakeCoordinator::serve(Script::default()).await;
         let mut progress = Captured::default().progress(OutputFormat::Json);
         for _ in 0..2 {
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_group_of_which_a_part_was_accepted_says_so() {
+    async fn the_error_of_a_partly_accepted_group_says_so() {
         let full = Status::failed_precondition("1000 experiments are unfinished already");
         let (_fake, connection) = FakeCoordinator::serve(Script {
             submit_refusals: [Status::ok(""), full].into(),

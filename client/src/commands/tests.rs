@@ -140,7 +140,7 @@ async fn transcript(script: Script, lines: &[&str]) -> String {
     transcript_on(None, script, lines).await
 }
 
-/// The same on a terminal of some width.
+/// Like [`transcript`], on a terminal of some width.
 async fn transcript_on(width: Option<usize>, script: Script, lines: &[&str]) -> String {
     let submitted_at_ms = script.experiment.submitted_at_ms;
     let (_fake, connection) = FakeCoordinator::serve(script).await;
@@ -168,7 +168,7 @@ async fn transcript_on(width: Option<usize>, script: Script, lines: &[&str]) -> 
             section.push(format!("[exit code {code}]"));
         }
         let section = section.join("\n").replace(connection.address(), "http://HOST:PORT");
-        // Its age is the same in every transcript, so the time differs.
+        // The experiment has the same age in every transcript, so its time of submission differs.
         let section = section.replace(&submitted_at_ms.to_string(), "SUBMITTED_MS");
         let section = section.replace(&clock::utc(submitted_at_ms), "SUBMITTED-AT-IN--UTC");
         sections.push(section);
@@ -352,7 +352,7 @@ const OLD_WORDS: &[(&str, &str)] = &[
 ];
 
 #[tokio::test]
-async fn old_words_do_what_the_new_ones_do_and_no_help_has_them() {
+async fn old_commands_equal_their_replacements_and_no_help_lists_them() {
     let cancelled = || {
         let mut script = script();
         script.experiment.set_state(ExperimentState::Cancelled);
@@ -387,7 +387,7 @@ async fn a_name_stands_for_the_number() {
 }
 
 #[tokio::test]
-async fn nothing_is_said_in_words() {
+async fn empty_tables_are_printed_as_sentences() {
     let script = Script { workers: vec![], past: vec![], ..script() };
     insta::assert_snapshot!(transcript(script, &["history 3", "workers", "logs"]).await);
 }

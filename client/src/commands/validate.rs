@@ -54,7 +54,7 @@ pub fn validate(args: &ValidateArgs, progress: &mut Progress) -> Result<(), Erro
         (0, 0) => Ok(()),
         (0, _) if !strict => Ok(()),
         (0, n) => Err(Error::Input(format!(
-            "experiment files with warnings: {n} of {}, and --strict takes none",
+            "experiment files with warnings: {n} of {}, and --strict allows none",
             files.len()
         ))),
         (n, _) => {
@@ -188,7 +188,7 @@ mod tests {
         given.strict = true;
         let error = validate(&given, &mut captured.progress(OutputFormat::Json)).unwrap_err();
         assert_eq!(error.exit_code(), 2);
-        let expected = "experiment files with warnings: 1 of 2, and --strict takes none";
+        let expected = "experiment files with warnings: 1 of 2, and --strict allows none";
         assert_eq!(error.to_string(), expected);
         given.files.pop();
         validate(&given, &mut captured.progress(OutputFormat::Table)).unwrap();

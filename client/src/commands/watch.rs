@@ -37,8 +37,8 @@ use self::{
 };
 
 /// Maximum number of experiments of a group that are followed at the same time. Each takes a
-/// stream of the one connection, and their situation takes one more. When one ends, the next
-/// is followed.
+/// stream of the one connection, and the reports of obstacles take one more. When one ends, the
+/// next is followed.
 const STREAMS_MAX: usize = 64;
 /// How often the command checks whether a program computes the data directory.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
@@ -59,8 +59,8 @@ pub struct Followed {
 ///
 /// The command first shows the generations that are already complete. It reports at once any
 /// obstacle, such as a pause or a lack of workers, with the next step. If the coordinator becomes
-/// unreachable, it tries for a minute to reconnect. Interrupting this command does not interrupt
-/// the experiment.
+/// unreachable, the command tries for a minute to reconnect. Interrupting this command does not
+/// interrupt the experiment.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct WatchArgs {
@@ -106,9 +106,9 @@ pub struct WatchArgs {
 }
 
 const HELP: &str = "\
-With --output json it prints a line per generation (numbered from 0), then one
-for each experiment with state, digest and champion; with --events a line per
-event, with kind generation, state or notice.
+With --output json, the command prints a line per generation (numbered from 0),
+then a line for each experiment with state, digest and champion; with --events
+a line per event, with kind generation, state or notice.
 
 Exit codes:
   0   the experiment completed, or ended as --for allows; with --events: it ended
@@ -210,8 +210,8 @@ async fn compare_group(
     progress.print(&next)
 }
 
-/// Shows the events of experiments until all of them have ended. They are returned in the
-/// order of their numbers.
+/// Shows the events of experiments until all of them have ended. Returns the experiments in
+/// the order of their numbers.
 pub async fn follow(
     connection: &Connection,
     experiments: Vec<Experiment>,
@@ -239,7 +239,7 @@ pub async fn follow(
                 Ok(first_best) => News::Ended(follower.experiment_id, first_best),
                 Err(error) => News::Failed(error),
             };
-            // The receiver is gone only if it has failed.
+            // The receiver is gone only after a failure.
             let _ = sender.send(last).await;
         });
     }
@@ -330,7 +330,7 @@ pub async fn ended(
 }
 
 /// Waits until no program computes the unfinished experiments of a data directory, then returns
-/// that error. Waits for ever with a coordinator, or if this process computes.
+/// an error. Waits for ever with a coordinator, or if this process computes.
 pub async fn deserted(connection: &Connection, experiments: &[Experiment]) -> Error {
     let Some(data_dir) = connection.data_dir().filter(|_| !connection.computes()) else {
         return pending().await;
@@ -348,7 +348,7 @@ pub async fn deserted(connection: &Connection, experiments: &[Experiment]) -> Er
                 Err(error) => return error,
             }
         }
-        // The last events are still to be shown.
+        // The followers end the command, after they have shown the last events.
         return pending().await;
     }
 }

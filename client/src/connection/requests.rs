@@ -19,7 +19,7 @@ const PIECE_LEN: usize = 1 << 20;
 const EVENT_PAGE_LEN: u32 = 100;
 
 impl Connection {
-    /// Starts an experiment, or returns the one of the same request id.
+    /// Starts an experiment, or returns the experiment of the same request id.
     pub async fn submit(
         &self,
         request: SubmitExperimentRequest,
@@ -130,8 +130,8 @@ impl Connection {
         }
     }
 
-    /// Imports a bundle; not repeated. Returns its experiment, and whether that is new
-    /// there.
+    /// Imports a bundle; not repeated. Returns the experiment, and whether the coordinator did
+    /// not have it before.
     pub async fn import(&self, bundle: &[u8]) -> Result<(Experiment, bool), Error> {
         let pieces = bundle.chunks(PIECE_LEN).map(<[u8]>::to_vec).collect::<Vec<_>>();
         let requests = pieces.into_iter().map(|piece| ImportExperimentRequest { piece });

@@ -1,4 +1,4 @@
-//! Its workers.
+//! The workers of the fake coordinator.
 
 use swarm_proto::v1::{
     ListWorkersRequest, ListWorkersResponse, ReadmitWorkerRequest, ReadmitWorkerResponse,

@@ -74,12 +74,12 @@ fn the_same_curves_give_the_same_bytes() {
 }
 
 #[test]
-fn as_many_curves_as_are_allowed_differ_in_colour_or_dashes() {
+fn the_maximum_number_of_curves_differ_in_colour_or_dashes() {
     let svg = many(CURVES_MAX).to_svg().unwrap();
     for i in 0..CURVES_MAX {
         assert!(svg.contains(&format!("\ncondition {i}\n")), "{i}");
     }
-    // The legend's samples, and the curves, straight lines both.
+    // The samples of the legend, and the curves: both are straight lines.
     let n_solid = svg.lines().filter(|line| line.contains(r#"stroke-width="5""#));
     let of_colour = |colour: &str| n_solid.clone().filter(|l| l.contains(colour)).count();
     // A solid curve, a dashed one of many pieces, and their samples.
@@ -97,13 +97,13 @@ fn curves_of_one_point_or_one_height_can_be_drawn() {
 }
 
 #[test]
-fn names_are_text_whatever_is_in_them() {
+fn names_are_text_whatever_they_contain() {
     let svg = figure(vec![curve("<b>&\"ü\"", &[(0.0, 0.0, 1.0, 2.0)])]).to_svg().unwrap();
     assert!(svg.contains("\n&lt;b&gt;&amp;&quot;ü&quot;\n"), "{svg}");
 }
 
 #[test]
-fn the_file_name_says_the_format() {
+fn the_file_name_selects_the_format() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.svg");
     two_runs().write(&path, Overwrite::default()).unwrap();

@@ -45,7 +45,7 @@ fn every_command_is_in_one_group() {
 }
 
 #[test]
-fn options_of_the_connection_are_shown_by_help_all_alone() {
+fn only_help_all_shows_options_of_the_connection() {
     for name in names().iter().filter(|name| *name != "help") {
         let shows = |line: String, option: &str| printed(&line, 80).contains(option);
         for option in ["--coordinator <", "--token-file <", "--tls-ca <", "--plaintext"] {

@@ -47,7 +47,7 @@ impl Fleet {
             Tokens::new(client_token.clone(), worker_token.clone()).expect("random tokens differ");
         let config = CoordinatorConfig {
             access: Access { tokens: Some(tokens), ..Access::default() },
-            // No other program has a token for it.
+            // No other program has a token for this coordinator.
             is_announced: false,
             // The user has started one experiment here, not the other unfinished ones.
             takes_up_unfinished: false,

@@ -14,7 +14,7 @@ fn names(directory: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_file_that_exists_is_replaced_only_if_that_is_wanted() {
+fn an_existing_file_is_replaced_only_on_request() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.svg");
     UNASKED.write(&path, b"first").unwrap();
@@ -31,7 +31,7 @@ fn a_file_that_exists_is_replaced_only_if_that_is_wanted() {
 }
 
 #[test]
-fn a_file_appears_when_it_is_finished_and_one_that_came_first_stays() {
+fn a_file_appears_when_finished_and_an_earlier_one_stays() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.csv");
     let mut file = UNASKED.begin(&path).unwrap();
@@ -46,7 +46,7 @@ fn a_file_appears_when_it_is_finished_and_one_that_came_first_stays() {
 }
 
 #[test]
-fn a_directory_is_no_file_a_file_no_directory_and_there_is_one_for_every_file() {
+fn files_and_directories_are_distinguished_and_a_missing_directory_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("file");
     fs::write(&file, "").unwrap();
@@ -62,7 +62,7 @@ fn a_directory_is_no_file_a_file_no_directory_and_there_is_one_for_every_file() 
 
 #[cfg(unix)]
 #[test]
-fn devices_are_written_as_they_are_links_stay_and_permissions_too() {
+fn devices_links_and_permissions_stay() {
     use std::os::unix::fs::{PermissionsExt as _, symlink};
     UNASKED.write(Path::new("/dev/null"), b"x").unwrap();
     let dir = tempfile::tempdir().unwrap();

@@ -64,7 +64,7 @@ fn without_a_terminal_each_generation_is_a_line() {
 }
 
 #[test]
-fn generations_of_a_group_say_whose_they_are() {
+fn generations_of_a_group_name_their_run() {
     let captured = Captured::default();
     let mut progress = captured.progress(OutputFormat::Table);
     let run = |id, seed, variant: &str| Experiment {
@@ -83,7 +83,7 @@ fn generations_of_a_group_say_whose_they_are() {
 }
 
 #[test]
-fn the_rest_takes_as_long_as_the_latest_generations() {
+fn the_remaining_time_follows_the_latest_generations() {
     assert_eq!(remaining(&[1500, 2500].into(), 10), Duration::from_secs(20));
     assert_eq!(remaining(&VecDeque::new(), 10), Duration::ZERO);
     let mut progress = Captured::default().progress(OutputFormat::Json);
@@ -95,14 +95,14 @@ fn the_rest_takes_as_long_as_the_latest_generations() {
     }
     assert_eq!(progress.followed[&1].durations_ms.len(), ETA_WINDOW);
     assert_eq!(progress.followed[&1].durations_ms.front(), Some(&99));
-    // Of several experiments, the last to end.
+    // Among several experiments, the last one to end counts.
     let slow = GenerationSummary { duration_ms: 60_000, ..Default::default() };
     progress.generation(2, &slow).unwrap();
     assert_eq!(progress.remaining(), Duration::from_secs(999 * 60));
 }
 
 #[test]
-fn digests_and_what_is_optimistic_are_for_those_who_ask() {
+fn digests_and_optimistic_fitness_are_printed_on_request() {
     let summary = GenerationSummary { digest: "ab".repeat(32), ..Default::default() };
     for (is_verbose, n_digests) in [(false, 0), (true, 1)] {
         let captured = Captured::default();
@@ -116,7 +116,7 @@ fn digests_and_what_is_optimistic_are_for_those_who_ask() {
 }
 
 #[test]
-fn a_long_rest_is_said_without_a_bar() {
+fn a_long_remaining_time_is_printed_without_a_bar() {
     let captured = Captured::default();
     let mut progress = captured.progress(OutputFormat::Table);
     progress.begin(&[Experiment { id: 1, generations: 61, ..Experiment::default() }]);
@@ -149,7 +149,7 @@ fn a_closed_pipe_ends_the_output_and_not_the_work() {
 }
 
 #[test]
-fn a_full_disk_ends_the_output_and_not_the_work_and_is_said_at_the_end() {
+fn a_full_disk_ends_the_output_and_not_the_work_and_is_reported_at_the_end() {
     let full = Box::new(Takes(io::ErrorKind::StorageFull));
     let mut progress = Progress::to(OutputFormat::Table, full);
     let unwritten = progress.unwritten();
@@ -161,7 +161,7 @@ fn a_full_disk_ends_the_output_and_not_the_work_and_is_said_at_the_end() {
 }
 
 #[test]
-fn without_a_terminal_long_work_says_now_and_then_how_much_is_done() {
+fn without_a_terminal_long_work_reports_its_progress_now_and_then() {
     let mut progress = Captured::default().progress(OutputFormat::Json);
     let start = clock::now();
     let mut words = |first: u64, seconds: u64| {

@@ -41,7 +41,7 @@ fn seeds_are_listed_or_spanned_with_both_ends() {
 }
 
 #[test]
-fn one_run_is_no_group_unless_it_is_asked_for() {
+fn one_run_is_a_group_only_on_request() {
     for more in [&[][..], &["--seed", "3"], &["--set", "algorithm.population_size=8"]] {
         let runs = swept(more).unwrap();
         assert_eq!((runs.len(), runs[0].group()), (1, None), "{more:?}");
@@ -79,7 +79,7 @@ fn a_group_has_all_combinations_of_seeds_and_values() {
 }
 
 #[test]
-fn the_request_of_a_run_depends_on_all_that_makes_the_run() {
+fn the_request_of_a_run_depends_on_all_its_settings() {
     let id = |more: &[&str]| {
         let runs = swept(&[&["--seeds", "5"], more].concat()).unwrap();
         runs[0].request.request_id.clone()
@@ -97,7 +97,7 @@ fn the_request_of_a_run_depends_on_all_that_makes_the_run() {
 }
 
 #[test]
-fn all_mistakes_of_all_values_are_said_at_once_and_once() {
+fn each_mistake_of_all_values_is_reported_once() {
     let report = refusal(&[
         "--seeds",
         "0..4",
@@ -127,7 +127,7 @@ fn all_mistakes_of_all_values_are_said_at_once_and_once() {
 }
 
 #[test]
-fn semicolons_separate_changes_as_several_options_do() {
+fn semicolons_separate_changes_like_repeated_options() {
     let [size, steps] = ["algorithm.population_size=8,16", "algorithm.evaluation_steps=9,10"];
     let together = swept(&["--set", &format!("{size}; {steps}")]).unwrap();
     let apart = swept(&["--set", size, "--set", steps]).unwrap();

@@ -60,7 +60,7 @@ fn names_and_reasons_stay_on_their_line_and_in_their_order() {
 }
 
 #[test]
-fn an_immediate_generation_divides_by_no_zero() {
+fn a_generation_without_duration_has_a_finite_speed() {
     let summary = GenerationSummary { duration_ms: 0, ..summary(0) };
     assert!(generation(&summary, 1).contains("617000 episodes/s"));
 }
@@ -98,7 +98,7 @@ fn the_end_has_state_fitness_champion_and_digest() {
 }
 
 #[test]
-fn cancelling_what_has_ended_says_so() {
+fn cancelling_an_ended_experiment_says_so() {
     let text = cancelled(&experiment(ExperimentState::Completed));
     assert!(text.ends_with("completed after 12 of 40 generations; nothing to cancel"), "{text}");
     let text = cancelled(&experiment(ExperimentState::Cancelled));

@@ -40,7 +40,7 @@ struct Quantity {
 #[derive(Debug, Serialize)]
 struct Summary {
     sample: String,
-    /// By ascending seed; infinite numbers are null.
+    /// In the order of the seeds; infinite numbers are null.
     values: Vec<f64>,
     median: Interval,
     iqm: Interval,
@@ -142,7 +142,7 @@ impl Quantity {
             Column::number("runs").dropped(1),
             Column::number("median"),
             Column::number("95 %"),
-            // The interval is left out before the IQM: alone, it would seem to belong to
+            // A narrow table drops the interval before the IQM: alone, it would seem to belong to
             // another number.
             Column::number("IQM").dropped(2),
             Column::number("95 %").dropped(3),

@@ -22,24 +22,24 @@ use crate::{
 
 /// The error of a file whose run is unknown.
 const UNNAMED: &str = "expected a file NAME-SEED.csv or NAME-SEED.json, or a champion file that \
-                       has its name in it";
+                       names its experiment";
 
 /// Runs that differ in their seed only.
 #[derive(Debug)]
 pub struct Sample {
     pub name: String,
-    /// By seed.
+    /// The runs by their seeds.
     pub runs: BTreeMap<u64, RecordedRun>,
 }
 
 /// The known facts of a run.
 #[derive(Debug, Default)]
 pub struct RecordedRun {
-    /// Its generations, if known.
+    /// The generations of the run, if known.
     pub history: Option<Vec<GenerationFitness>>,
-    /// Fitness of its champion on trials that selected nothing, if known.
+    /// Fitness of the champion on trials that selected nothing, if known.
     pub judged: Option<f64>,
-    /// The file or experiment that it was read from.
+    /// The files or experiments from which the run was read.
     sources: Vec<String>,
 }
 
@@ -90,10 +90,10 @@ impl Samples {
         if path.extension().is_some_and(|ending| ending == "json") {
             let text = read_text(path, GENOTYPE_BYTES).map_err(|error| error.to_string())?;
             let champion: ChampionFile = serde_json::from_str(&text)
-                .map_err(|error| format!("{error}; expected what `swarmctl champion` writes"))?;
+                .map_err(|error| format!("{error}; expected the output of `swarmctl champion`"))?;
             let Seed(seed) = champion.seed;
             let name = match of_file {
-                Some((_, other)) if other != seed => return Err(format!("it is of seed {seed}")),
+                Some((_, other)) if other != seed => return Err(format!("its seed is {seed}")),
                 Some((name, _)) => name,
                 None if champion.name.is_empty() => return Err(UNNAMED.into()),
                 None => champion.name,

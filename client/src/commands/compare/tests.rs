@@ -121,7 +121,7 @@ async fn tables_fit_the_terminal() {
 }
 
 #[tokio::test]
-async fn all_files_that_are_wrong_are_named_at_once() {
+async fn all_wrong_files_are_named_at_once() {
     let (dir, mut paths) = files();
     let write = |name: &str, text: &str| {
         fs::write(dir.path().join(name), text).unwrap();
@@ -136,7 +136,7 @@ async fn all_files_that_are_wrong_are_named_at_once() {
     assert_eq!(error.exit_code(), 2);
     let text = error.to_string();
     for part in
-        ["given twice", "NAME-SEED.csv", "it is of seed 8", "swarmctl history", "No such file"]
+        ["given twice", "NAME-SEED.csv", "its seed is 8", "swarmctl history", "No such file"]
     {
         assert!(text.contains(part), "{part}: {text}");
     }
@@ -144,7 +144,7 @@ async fn all_files_that_are_wrong_are_named_at_once() {
 }
 
 #[tokio::test]
-async fn the_number_of_generations_that_is_averaged_is_the_one_that_there_is() {
+async fn titles_state_the_number_of_averaged_generations() {
     let dir = tempfile::tempdir().unwrap();
     let run_of = |seed: u32, n: usize| {
         let path = dir.path().join(format!("a-{seed}.csv"));
@@ -168,7 +168,7 @@ async fn the_number_of_generations_that_is_averaged_is_the_one_that_there_is() {
 }
 
 #[tokio::test]
-async fn the_champion_files_of_run_say_their_name_and_seed_themselves() {
+async fn champion_files_of_run_contain_their_name_and_seed() {
     let dir = tempfile::tempdir().unwrap();
     let champion = |file: &str, name: &str, seed: u64, mean: f64| {
         let path = dir.path().join(file);
@@ -189,7 +189,7 @@ async fn the_champion_files_of_run_say_their_name_and_seed_themselves() {
     assert_eq!((&samples[1]["sample"], &samples[1]["values"][0]), (&"b".into(), &0.5.into()));
     let unnamed = [champion("champion.json", "", 7, 0.5)];
     let error = run(NOWHERE, &unnamed, None, OutputFormat::Table).await.unwrap_err().to_string();
-    assert!(error.contains("NAME-SEED.json") && error.contains("its name in it"), "{error}");
+    assert!(error.contains("NAME-SEED.json") && error.contains("names its experiment"), "{error}");
 }
 
 #[tokio::test]

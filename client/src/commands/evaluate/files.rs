@@ -105,7 +105,7 @@ impl Results {
         self.write(name, &String::from_utf8_lossy(&bytes))
     }
 
-    /// Puts the files where they belong.
+    /// Moves the files to their destination.
     pub fn finish(self) -> Result<(), Error> {
         self.0.finish()
     }

@@ -108,7 +108,7 @@ fn checked(
     let is_whole = |(number, trial): (u32, &MeasuredTrial)| {
         trial.trial == number && trial.values.len() == n_values
     };
-    // A script may have no measures; an answer without a task has no steps.
+    // The task of a script may have no measures, but every task has steps.
     if trials.len() != n_trials as usize || steps == 0 || !(0..).zip(&trials).all(is_whole) {
         return Err(Error::Internal("the coordinator's answer is incomplete".into()));
     }
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_task_without_measures_is_whole_and_an_answer_without_a_task_is_not() {
+    fn an_answer_may_lack_measures_but_not_the_task() {
         let trial = |trial| MeasuredTrial { trial, fitness: 0.5, ..MeasuredTrial::default() };
         let task = || MeasuredTask { steps: 3, ..MeasuredTask::default() };
         let measured = checked(Some(task()), vec![trial(0), trial(1)], 2).unwrap();

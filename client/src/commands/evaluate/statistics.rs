@@ -45,7 +45,7 @@ pub struct Estimate {
     /// 95 % confidence interval of the mean, by empirical likelihood: see
     /// [`evolution::interval`].
     pub ci95: [f64; 2],
-    /// Of shares only: mean -+ z sqrt(mean (1 - mean) / n), Eq. 6.1 of the thesis.
+    /// For shares only: mean -+ z sqrt(mean (1 - mean) / n), Eq. 6.1 of the thesis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proportion_ci95: Option<[f64; 2]>,
     #[serde(flatten)]
@@ -55,7 +55,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// None if there are no values, or one is not finite; `is_share`: whether they lie in
+    /// None if there are no values, or one is not finite. `is_share`: whether the values lie in
     /// [0, 1].
     pub fn from_values(values: &[f64], is_share: bool) -> Option<Self> {
         let quartiles = Quartiles::from_values(values.to_vec())?;
@@ -92,7 +92,7 @@ impl fmt::Display for Estimate {
     }
 }
 
-/// The mean; none if there are no values. Of finite values it is finite.
+/// The mean; none if there are no values. The mean of finite values is finite.
 pub fn mean(values: &[f64]) -> Option<f64> {
     let sum = values.iter().fold(0.0, |sum, value| sum + value);
     let plain = (!values.is_empty()).then(|| sum / values.len() as f64)?;

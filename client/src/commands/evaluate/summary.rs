@@ -170,7 +170,7 @@ mod tests {
     use super::unit;
 
     #[test]
-    fn shares_are_known_by_name_and_what_a_script_counts_is_not_taken_for_one() {
+    fn shares_are_known_by_name_and_measures_of_scripts_are_not_shares() {
         assert_eq!(unit("near_light_others"), (Some("share"), true));
         assert_eq!(unit("center_distance"), (Some("cm"), false));
         assert_eq!(unit("delivered"), (None, false));

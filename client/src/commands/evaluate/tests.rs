@@ -76,7 +76,7 @@ fn a_swarm_of_another_size_has_the_same_share_of_affected_robots() {
 }
 
 #[test]
-fn what_is_inhibited_is_so_beside_what_has_been() {
+fn an_inhibition_adds_to_those_of_the_file() {
     let args = EvaluateArgs { inhibit: strings(&["msg", "I4", "light_sensor"]), ..args() };
     let followers = conditions("light_follower_snes", &args).unwrap();
     let light = json!({"stimuli": "light_sensor", "affected_robots": 8});
@@ -144,7 +144,7 @@ fn changes_make_a_condition_or_all_of_them() {
 }
 
 #[test]
-fn a_condition_is_there_once() {
+fn a_condition_that_is_given_twice_is_refused() {
     let args = EvaluateArgs { robots: vec![5, 5], ..args() };
     let error = conditions("light_follower_snes", &args).unwrap_err();
     assert_eq!(error.to_string(), "condition robots=5 is given twice");
@@ -160,7 +160,7 @@ fn measured() -> Measured {
 }
 
 #[test]
-fn what_is_absent_is_left_out_of_means_and_files() {
+fn absent_values_are_left_out_of_means_and_files() {
     let dir = tempfile::tempdir().unwrap();
     let conditions = conditions("light_follower_snes", &args()).unwrap();
     let results = Results::begin(dir.path(), Overwrite::default()).unwrap();
@@ -208,7 +208,7 @@ fn the_summary_estimates_time_means_and_ends() {
 }
 
 #[test]
-fn values_of_one_option_make_a_condition_each() {
+fn each_value_of_an_option_makes_a_condition() {
     let set = SetArg { set: strings(&["world.height=1000,2000; seed=7", "seed=8"]) };
     let conditions = conditions("light_follower_snes", &EvaluateArgs { set, ..args() }).unwrap();
     let names: Vec<&str> = conditions.iter().map(|condition| &*condition.name).collect();

@@ -12,8 +12,8 @@ use tokio::time::Instant;
 pub const ITEMS_PER_WORKER: u64 = 16;
 /// The fleet grows once the queue has been long for this time.
 pub const UP_WINDOW: Duration = Duration::from_secs(30);
-/// The fleet shrinks once the queue has been short for this time. It is longer than the end
-/// of a generation, when no item is left.
+/// The fleet shrinks once the queue has been short for this time. The empty queue at the end of
+/// a generation does not last so long.
 pub const DOWN_WINDOW: Duration = Duration::from_secs(600);
 
 /// Bounds of the number of workers.
@@ -56,7 +56,7 @@ impl Autoscaler {
     }
 }
 
-/// A job of the batch system that runs a worker, or will.
+/// A job of the batch system that runs a worker, or waits to run one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Job {
     pub id: String,
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_a_generation_sends_nobody_away_and_a_long_idleness_does() {
+    fn only_a_long_idleness_ends_workers() {
         let start = Instant::now();
         let at = |s| start + Duration::from_secs(s);
         let mut scaler = Autoscaler::new(Bounds { min: 0, max: 40 });
@@ -131,7 +131,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_bounds_hold_and_a_steady_queue_gets_what_it_needs(
+        fn the_bounds_hold_and_a_steady_queue_gets_enough_workers(
             queue in prop::collection::vec((0..2000_u64, 1..100_u64), 1..40),
             n_workers in 0..60_u32,
         ) {
@@ -152,7 +152,7 @@ mod tests {
         }
 
         #[test]
-        fn a_plan_leads_to_as_many_jobs_as_are_wanted_and_ends_no_worker_before_a_job_that_waits(
+        fn a_plan_leads_to_the_wanted_number_and_ends_waiting_jobs_first(
             running in prop::collection::vec(any::<bool>(), 0..30),
             n_wanted in 0..30_u32,
         ) {

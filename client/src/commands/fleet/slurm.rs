@@ -14,7 +14,7 @@ pub struct Slurm {
     pub job_name: String,
     /// The worker's command line, for a shell.
     pub script: String,
-    /// Time after which its worker ends if it is idle.
+    /// Time after which an idle worker ends.
     pub idle_timeout: Duration,
     /// More arguments of `sbatch`.
     pub sbatch_args: Vec<String>,
@@ -78,14 +78,14 @@ async fn cancel(how: &[&str], ids: &[String]) -> Result<(), Error> {
     call("scancel", how.iter().copied().chain(ids)).await.map(drop)
 }
 
-/// Standard output of a command of Slurm's.
+/// Runs a command of Slurm, and returns its standard output.
 async fn call(
     program: &str,
     arguments: impl IntoIterator<Item = impl AsRef<OsStr>>,
 ) -> Result<String, Error> {
     let output = Command::new(program).args(arguments).output().await.map_err(|error| {
         Error::Input(format!(
-            "cannot run {program}: {error}; this command needs a machine of Slurm"
+            "cannot run {program}: {error}; this command needs a machine that has Slurm"
         ))
     })?;
     let Output { status, stdout, stderr } = output;
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn the_script_is_one_command_that_a_shell_becomes() {
+    fn the_script_is_one_command_that_replaces_the_shell() {
         let script = script("my worker", "https://h:1", Duration::from_secs(600), None);
         assert!(script.starts_with("exec 'my worker' --coordinator https://h:1 "), "{script}");
         assert!(script.ends_with("--idle-timeout 600s"), "{script}");

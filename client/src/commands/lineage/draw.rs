@@ -38,9 +38,8 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
-    /// Adds an individual and its ancestors. `before`: the prefix of all their lines;
-    /// `branch` and `below`: the text after that prefix in its own line, and in those of its
-    /// ancestors.
+    /// Adds an individual and its ancestors. `before`: the prefix of all lines. After
+    /// it, `branch` begins the line of the individual, and `below` the lines of its ancestors.
     fn grow(&mut self, of: &Ancestor, before: String, branch: &str, below: &str) {
         let place = (of.generation, of.individual);
         let is_new = self.shown.insert(place);

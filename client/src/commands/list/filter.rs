@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_comes_last() {
+    fn unknown_values_come_last() {
         let sorted = |sort| ids(Filter { sort, ..Filter::default() });
         assert_eq!(sorted(Sort::Best), [2, 1, 3]);
         assert_eq!(sorted(Sort::Age), [2, 1, 3]);

@@ -33,7 +33,7 @@ pub fn figure(dir: &Path, metric: Option<&str>, conditions: &[String]) -> Result
     let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
     let mut reader = csv::Reader::from_path(&path).map_err(|error| problem(plain(&error)))?;
     let rows: Vec<Row> = reader.deserialize().collect::<Result<_, _>>().map_err(|error| {
-        problem(format!("{}; expected what `swarmctl evaluate` writes", plain(&error)))
+        problem(format!("{}; expected a file of `swarmctl evaluate`", plain(&error)))
     })?;
     let metrics: IndexSet<&str> = rows.iter().map(|row| row.metric.as_str()).collect();
     let known = || metrics.iter().copied().collect::<Vec<_>>().join(", ");
@@ -128,7 +128,7 @@ nominal,5,leaders,50,1,1,2,1.5
     }
 
     #[test]
-    fn what_is_no_evaluation_is_refused_in_one_line() {
+    fn a_directory_without_an_evaluation_is_refused_in_one_line() {
         for text in ["a,b\n1,2\n", "", "condition,step,metric,n,median,q1,q3,mean\na,b,c\n"] {
             let error = drawn(text, None).unwrap_err();
             assert_eq!((error.exit_code(), error.to_string().lines().count()), (2, 1), "{error}");

@@ -88,7 +88,7 @@ async fn the_band_goes_from_the_worst_to_the_best() {
 }
 
 #[test]
-fn runs_of_the_same_name_are_told_apart() {
+fn runs_of_the_same_name_get_different_names() {
     let run = |name: &str, source: &str| Run {
         name: name.into(),
         source: source.into(),
@@ -100,7 +100,7 @@ fn runs_of_the_same_name_are_told_apart() {
 }
 
 #[tokio::test]
-async fn what_is_no_history_is_refused_in_one_line() {
+async fn a_file_without_a_history_is_refused_in_one_line() {
     let dir = tempfile::tempdir().unwrap();
     let header = "experiment,generation,best,mean,min,digest\n";
     for (text, expected) in [
@@ -123,7 +123,7 @@ async fn what_is_no_history_is_refused_in_one_line() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_drawn_is_refused_before_anybody_is_asked() {
+async fn a_figure_that_cannot_be_drawn_is_refused_before_any_request() {
     let dir = tempfile::tempdir().unwrap();
     let pdf = run(NOWHERE, &["3"], dir.path().join("a.pdf")).await.unwrap_err();
     assert!(pdf.to_string().ends_with("a figure's name ends in .svg or .png"), "{pdf}");

@@ -29,8 +29,9 @@ const FRAMES_MAX: usize = 2_000;
 const PACE: u16 = 20;
 /// Steps of the trail behind a robot.
 const TRAIL: usize = 60;
-/// Drawn pixels along a side for each pixel of a picture, which is their mean: this smooths
-/// edges. Animations have many pictures, so they are drawn less finely.
+/// Number of drawn pixels along each side of a pixel of the picture. A pixel of the picture is
+/// the mean of its drawn pixels, which smooths edges. Animations, with their many pictures, are
+/// drawn less finely.
 const FINE: u32 = 3;
 const FINE_OF_ANIMATIONS: u32 = 2;
 /// Number of frames from which the colours of an animation are chosen.
@@ -153,7 +154,7 @@ pub fn svg(
     Ok(text.replacen(&sizes[0], &sizes[1], 1).into_bytes())
 }
 
-/// The PNG of some steps of an episode; without steps, of the last one.
+/// The PNG of the requested steps of an episode, or of its last step without a request.
 pub fn png(
     config: &ExperimentConfig,
     steps: &[StepRecord],
@@ -200,7 +201,8 @@ pub fn png(
     Ok(bytes)
 }
 
-/// A picture of the last of some steps, drawn with `times` as many pixels along a side.
+/// A picture of the last of some steps. It is drawn with `times` as many pixels along a side,
+/// then reduced.
 fn smooth(
     side: u32,
     times: u32,

@@ -72,7 +72,7 @@ async fn an_animation_of_a_hundred_steps_is_small() {
 }
 
 #[tokio::test]
-async fn a_picture_has_the_size_and_density_that_are_wanted() {
+async fn a_picture_has_the_requested_size_and_density() {
     let directory = tempfile::tempdir().unwrap();
     let [png, svg] = ["swarm.png", "swarm.svg"].map(|name| directory.path().join(name));
     let options = ["--at", "60", "--size", "300", "--dpi", "600", "--to"];
@@ -124,7 +124,7 @@ fn steps_are_read_like_seeds() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_played_leaves_no_file() {
+async fn a_refused_replay_leaves_no_file() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("swarm.html");
     let to = path.to_str().unwrap();
@@ -149,7 +149,7 @@ async fn what_cannot_be_played_leaves_no_file() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_champion_plays_the_median_of_the_trials_that_judged_it() {
+async fn a_champion_plays_the_median_trial_of_its_judgement() {
     let directory = tempfile::tempdir().unwrap();
     let data = directory.path().join("data");
     let at = ["--data-dir", data.to_str().unwrap()];
@@ -162,7 +162,7 @@ async fn a_champion_plays_the_median_of_the_trials_that_judged_it() {
     let n = |is_counted: &dyn Fn(f64) -> bool| {
         fitness.iter().filter(|value| is_counted(**value)).count()
     };
-    // Of 200, the hundredth.
+    // The hundredth of 200 sorted values.
     let is_median =
         |value: f64| n(&|other| other < value) < 100 && n(&|other| other <= value) >= 100;
     let medians: Vec<usize> = (0..200).filter(|&trial| is_median(fitness[trial])).collect();

@@ -44,8 +44,8 @@ impl Origin {
         Some(origin).filter(|origin| !origin.config_digest.is_empty())
     }
 
-    /// Refuses an experiment file that, with the genotype's seed, is another experiment than
-    /// the genotype's, unless `--changed-conditions` is given. `genotype`: its source.
+    /// Refuses an experiment file if the genotype evolved under another one, whatever the seed,
+    /// unless `--changed-conditions` is given. `genotype`: the source of the genotype.
     pub fn check(
         &self,
         genotype: &str,
@@ -105,14 +105,14 @@ mod tests {
     }
 
     #[test]
-    fn a_champion_is_taken_with_the_file_in_which_it_was_evolved_whatever_its_seed() {
+    fn a_champion_is_accepted_with_its_own_file_whatever_the_seed() {
         for seed in [0, 7, u64::MAX] {
             check(&champion(seed), &quickstart(), ChangedArg::default()).unwrap();
         }
     }
 
     #[test]
-    fn a_champion_is_refused_with_another_file_unless_that_is_wanted() {
+    fn a_champion_is_refused_with_another_file_unless_an_option_allows_it() {
         let directory = tempfile::tempdir().unwrap();
         let longer = directory.path().join("longer.json");
         let text = fs::read_to_string(quickstart()).unwrap();
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_of_genes_says_nothing_of_its_experiment() {
+    fn a_list_of_genes_names_no_experiment() {
         for genes in [json!([0.5]), json!({"genotype": [0.5]}), json!({"config_digest": null})] {
             assert_eq!(Origin::of_file(&genes).unwrap(), None);
         }

@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_list_of_numbers_is_refused_in_one_line() {
+    fn a_file_without_a_list_of_numbers_is_refused_in_one_line() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("genes.json");
         for text in ["", "[0.1", "3", "{}", r#"{"genotype": 3}"#, r#"[0.1, "0.2"]"#, "[null]"] {

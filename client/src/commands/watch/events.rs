@@ -1,8 +1,8 @@
 //! Prints the events of an experiment, of a group, or of all experiments, in the order of time.
 //!
-//! The merged log does not watch every experiment: one stream per experiment would not scale,
-//! and ordering the events of a moment requires all of them. It reads again when the
-//! coordinator announces news.
+//! The merged log does not follow one stream per experiment: so many streams would not scale,
+//! and events of the same moment can be ordered only when all of them are known. It reads new
+//! events when the coordinator announces news.
 
 mod merge;
 
@@ -27,7 +27,7 @@ use self::merge::Merge;
 /// The events to print.
 #[derive(Debug)]
 pub struct Wanted {
-    /// Their experiments; none: all experiments, in the order of time.
+    /// The experiments of the events; none: all experiments, in the order of time.
     pub subject: Option<Subject>,
     /// Whether to wait for new events until the experiments have ended.
     pub follow: bool,
@@ -42,8 +42,8 @@ pub async fn print(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let patience = if wanted.follow { PATIENCE } else { connection.patience() };
-    // The first request has the usual patience, so an unreachable coordinator soon is an
-    // error.
+    // The first request has the usual patience, so that an unreachable coordinator soon
+    // becomes an error.
     let mut experiments = chosen(connection, wanted.subject.as_ref()).await?;
     let connection = connection.with_patience(patience);
     // Per experiment, the sequence number of the next event to print.

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_are_kept_if_they_are_few_and_the_nearest_ones_taken_otherwise() {
+    fn few_colours_are_kept_and_many_are_replaced_by_the_nearest() {
         let frame: Vec<u8> =
             (0..=255).flat_map(|i| [i, i, 0].repeat(if i == 7 { 1 } else { 2 })).collect();
         let mut palette = Palette::from_frames([&*frame].into_iter());
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_changes_has_a_rectangle() {
+    fn changes_have_a_rectangle() {
         let mut frames = Frames::new(4, Palette::from_frames(std::iter::empty()));
         frames.shown = vec![1; 16];
         assert_eq!(frames.changed(&[1; 16]), [0, 0, 1, 1]);

@@ -13,12 +13,12 @@ pub struct Camera {
     period: Vec2,
     /// Pixels of the canvas per cm.
     pub scale: f64,
-    /// Its side, pixels.
+    /// Side of the canvas, pixels.
     side: f64,
 }
 
 impl Camera {
-    /// Sees all robots and lights in some steps; at most the whole world.
+    /// A camera that shows all robots and lights in some steps, but at most the whole world.
     pub fn around(config: &ExperimentConfig, steps: &[StepRecord], pixels: u32) -> Self {
         let period = Vec2::new(config.world.width, config.world.height);
         let places = || steps.iter().flat_map(places);
@@ -55,7 +55,7 @@ fn places(step: &StepRecord) -> impl Iterator<Item = Vec2> {
     step.robots.iter().map(|robot| robot.position).chain(step.lights.iter().copied())
 }
 
-/// The representative of a difference with the least absolute value.
+/// A difference on the torus, by the shorter way.
 fn shortest(difference: f64, period: f64) -> f64 {
     difference - period * (difference / period).round()
 }

@@ -49,7 +49,7 @@ pub struct Discs {
 }
 
 impl Discs {
-    /// In the order of the records.
+    /// The areas and lights, in the order of the records.
     pub fn new(config: &ExperimentConfig) -> Self {
         let mut discs = Self { areas: Vec::new(), lights: Vec::new() };
         for object in config.world.objects.values() {
@@ -74,7 +74,7 @@ impl Discs {
 fn color_named(name: &str) -> RGBColor {
     match name {
         "black" => RGBColor(0, 0, 0),
-        "white" => RGBColor(200, 206, 216), // against a ground that is white
+        "white" => RGBColor(200, 206, 216), // visible on a white ground
         "red" => ON,
         "green" => TARGET,
         "blue" => FRAME,
@@ -140,7 +140,7 @@ impl<B: DrawingBackend> Pen<'_, B> {
         self.area.draw(&PathElement::new(ends.to_vec(), style))
     }
 
-    /// Whether a line stays on this side of the edge.
+    /// Whether a line lies within the picture and does not jump across the edge of the world.
     fn is_near(&self, from: Place, to: Place) -> bool {
         let seen = 0..=self.side as i32;
         let is_seen = |at: Place| seen.contains(&at.0) && seen.contains(&at.1);

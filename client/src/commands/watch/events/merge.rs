@@ -15,7 +15,7 @@ use crate::{connection::Connection, error::Error};
 pub struct Merge<'a> {
     connection: &'a Connection,
     sources: Vec<Source<'a>>,
-    /// Time of the next event of each source that has one, and its index. Within a
+    /// Time of the next event of each source that has one, and index of the source. Within a
     /// millisecond, events of the older experiment come first.
     heads: BinaryHeap<Reverse<(u64, usize)>>,
     is_begun: bool,
