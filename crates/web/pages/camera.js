@@ -13,7 +13,8 @@ export class Camera {
     this.showSwarm();
   }
 
-  /** All places that robots, lights and areas ever reach, if they are less than the world. */
+  /** Shows all places that robots, lights and areas ever reach, or the whole world if these places
+   *  are most of it. */
   showSwarm() {
     const { episode } = this;
     const first = [episode.at("x", 0, 0), episode.at("y", 0, 0)];
@@ -41,18 +42,18 @@ export class Camera {
     this.look(first[0] + (low[0] + high[0]) / 2, first[1] + (low[1] + high[1]) / 2, across + 70, along + 70);
   }
 
-  /** The whole world. */
+  /** Shows the whole world. */
   showWorld() {
     const { width, height } = this.episode;
     this.look(width / 2, height / 2, width, height);
   }
 
-  /** A centre, and a rectangle around it that must be in view, cm. */
+  /** Shows at least a rectangle of `across` x `along` around a centre, cm. */
   look(x, y, across, along) {
     Object.assign(this, { x, y, across, along, zoom: 1 });
   }
 
-  /** A canvas without a size keeps its last one: the scale is never 0. */
+  /** Ignores the size 0 of a hidden canvas, so that the scale is never 0. */
   resize(width, height) {
     if (width > 0 && height > 0) Object.assign(this, { width, height });
   }

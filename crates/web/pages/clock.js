@@ -8,7 +8,7 @@ export class Clock {
     Object.assign(this, { step, share: 0, isPlaying: false, steps: 0 });
     this.place = SPEEDS.indexOf(20);
     this.players = [];
-    /** When this has changed, the frames of an earlier start end. */
+    /** Changes with each start, which ends the frames of earlier starts. */
     this.starts = 0;
   }
 

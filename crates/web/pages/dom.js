@@ -25,13 +25,13 @@ export function onTheme(changed) {
 const themed = [];
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   for (const changed of themed) changed();
-  // Only shown canvases: this keeps no removed ones.
+  // A search of the page, because a list would keep removed canvases in memory.
   for (const node of document.querySelectorAll("canvas")) node.redraw?.();
 });
 
-/** A canvas that fills its parent, in pixels of the device; draws whenever its size changes. While
- *  it has no size, as in a hidden frame or after it was removed, nothing is drawn: `draw` is called
- *  with a width and a height of at least one pixel. Without a label, the surrounding elements must
+/** A canvas that fills its parent, in pixels of the device; draws whenever its size changes. It
+ *  draws nothing while it has no size, as in a hidden frame or after it was removed, so `draw` gets
+ *  a width and a height of at least one pixel. Without a label, the surrounding elements must
  *  describe it. */
 export function canvas(draw, label) {
   const node = element("canvas", label ? { "aria-label": label, role: "img" } : { "aria-hidden": "true" });

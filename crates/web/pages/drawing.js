@@ -23,7 +23,7 @@ function read() {
   return colors;
 }
 
-/** The colour of symbol `number` of `n`, that of a rainbow. */
+/** The colour of symbol `number` of `n`, from a rainbow. */
 export function symbolColor(number, n, isDark) {
   if (number === null) return isDark ? "hsl(210 70% 65%)" : "hsl(215 70% 45%)";
   return `hsl(${Math.round((360 * number) / Math.max(n, 1) + 200) % 360} 72% ${isDark ? 66 : 44}%)`;
@@ -60,7 +60,7 @@ export function rgb(text) {
   return [(number >> 16) & 255, (number >> 8) & 255, number & 255];
 }
 
-/** Makes a disc the path. */
+/** Sets a disc as the path of the canvas. */
 export function disc(context, x, y, radius) {
   context.beginPath();
   context.arc(x, y, radius, 0, 2 * Math.PI);

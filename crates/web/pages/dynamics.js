@@ -1,5 +1,5 @@
-// The movement of an algorithm's distribution. The server must repeat the generations for
-// it, so it is loaded on request.
+// The movement of an algorithm's distribution. The server repeats the generations to find it, so
+// the page requests it only when the user opens this part.
 
 import { chart } from "swarm/charts.js";
 import { element } from "swarm/dom.js";

@@ -103,7 +103,7 @@ export class Episode {
   }
 }
 
-/** The representative of a difference with the least absolute value. */
+/** A difference on the torus, by the shorter way. */
 export function shortest(difference, period) {
   return difference - period * Math.round(difference / period);
 }

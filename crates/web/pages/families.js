@@ -1,5 +1,5 @@
-// The fitness of each child over the fitness of its parents. The server must repeat the
-// generations for it, so it is loaded on request.
+// The fitness of each child over the fitness of its parents. The server repeats the generations to
+// find the parents, so the page requests them only when the user opens this part.
 
 import { axes, shape } from "swarm/charts.js";
 import { canvas, decimals, element } from "swarm/dom.js";

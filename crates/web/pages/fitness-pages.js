@@ -27,13 +27,13 @@ export class FitnessPages {
     return this.generations.get(generation);
   }
 
-  /** The nearest known generation at or before one. */
+  /** The latest known generation up to this one. */
   nearest(generation) {
     for (let it = generation; it > generation - PAGE && it >= 0; it--) if (this.generations.has(it)) return it;
     return generation;
   }
 
-  /** Pages with the generations from `from` to before `to`, one in `every` if not all fit. */
+  /** Pages with the generations from `from` to before `to`; one in `every` of these if not all fit. */
   needed(from, to, width, n_generations) {
     const n_values = (to - from) * Math.max(1, this.n_individuals);
     const every = 2 ** Math.max(0, Math.floor(Math.log2((to - from) / Math.max(1, width))), Math.ceil(Math.log2(n_values / VALUES_MAX)));
@@ -57,10 +57,10 @@ export class FitnessPages {
         if (next >= end) continue;
         const response = await ask(`/api/experiments/${this.id}/fitness?from=${next}&n=${end - next}&every=${every}`);
         const reached = this.take(await response.arrayBuffer(), every);
-        // The log may have lost these generations: nothing comes.
+        // The log may lack these generations: then the answer has no values.
         this.next.set(key, Math.max(next, reached ?? end));
         isNew = true;
-        // Now the size of a generation is known, and so the number that fits.
+        // Now the size of a generation is known: fewer generations may fit than were planned.
         if (from === pages[0].from && pages.length > 1 && this.n_individuals * n_generations > VALUES_MAX) break;
       }
     } finally {
@@ -70,7 +70,7 @@ export class FitnessPages {
     return isNew;
   }
 
-  /** Takes an answer; the generation after its last one, null if it has none. */
+  /** Takes an answer. Returns the generation after its last one; null if it has none. */
   take(buffer, every) {
     const [start, n, individuals] = new Uint32Array(buffer, 0, 3);
     const values = new Float32Array(buffer, 12);

@@ -23,9 +23,9 @@ const FATES = {
   lost: "lost with its worker",
 };
 
-/** Puts the assignments of a worker into lanes. Results state their time of computing. For other
- *  assignments only the time of sending is known: each takes the free time before its end, and
- *  those without any had not begun. */
+/** Puts the assignments of a worker into lanes. Results state their time of computing. Other
+ *  assignments have only the time of sending: each takes the free time before its end. An assignment
+ *  without free time had not begun. */
 function inLanes(assignments, n_lanes) {
   const lanes = Array.from({ length: n_lanes }, () => []);
   const placed = [];
@@ -161,7 +161,7 @@ export function fleetTimeline() {
     return nodes;
   };
 
-  /** Where an assignment is. */
+  /** The rectangle of an assignment. */
   const boxOf = (row, it, width) => {
     const lane = height(row) / row.n_lanes;
     const [from, to] = [Math.max(left(width), x(it.start, width)), x(it.end, width)];
@@ -205,7 +205,7 @@ export function fleetTimeline() {
     const place = cursor?.it ? row.its.indexOf(cursor.it) : -1;
     const by = event.shiftKey ? 10 : 1;
     const go = (to) => goTo({ row, it: row.its[Math.max(0, Math.min(row.its.length - 1, to))] });
-    // The same time at another worker.
+    // Keeps the time, at another worker.
     const goToRow = (to) => {
       const other = rows[Math.max(0, Math.min(rows.length - 1, to))];
       const at = cursor?.it?.start ?? window[1];
@@ -220,7 +220,7 @@ export function fleetTimeline() {
   });
   new ResizeObserver(draw).observe(node);
   node.show = (latest, workers) => {
-    // While the user points at an assignment, or goes through them with keys, the picture
+    // While the user points at an assignment, or goes through assignments with keys, the picture
     // stays.
     if (picture.matches(":hover") || cursor) return;
     answer = latest;

@@ -27,8 +27,8 @@ function progress(it) {
 }
 
 /** Each has a name, a title, a width, the cell of an experiment, and a value that sorts (null:
- *  none). `says`: the data of the cell, and `saved`: the value in a saved table, if they differ
- *  from that value. */
+ *  none). `says`: the data of the cell; `saved`: the value in a saved table; each is given only
+ *  if it differs from the value that sorts. */
 export const COLUMNS = [
   { name: "champion", title: "Champion", width: "5.5rem", isUsual: true, isGreatFirst: true, value: (it) => it.champion ?? it.selection, says: (it) => [it.champion, it.selection, it.generations_done > 0], cell: worth },
   { name: "state", title: "State", width: "7.5rem", isUsual: true, value: (it) => it.state, says: (it) => [it.state, it.reason], cell: (it) => [stateMark(it)] },

@@ -27,7 +27,7 @@ export class ListView {
   showColumn(name, isShown) {
     const names = this.columns.filter((it) => (it.name === name ? isShown : this.shown.includes(it))).map((it) => it.name);
     const isUsual = this.columns.every((it) => names.includes(it.name) === Boolean(it.isUsual));
-    // An empty list means the usual columns: the last one stays.
+    // An empty list would mean the usual columns, so the last column stays.
     if (names.length) this.set({ show: isUsual ? "" : names.join(",") });
   }
 

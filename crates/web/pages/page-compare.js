@@ -109,7 +109,7 @@ async function show() {
 try {
   experiments = await allExperiments();
   if (chosen.size === 0) for (const it of experiments.slice(-5)) chosen.add(it.id);
-  // The compared runs come first, before any number of others.
+  // The compared runs come first, however many others there are.
   const ordered = experiments.toReversed().sort((a, b) => chosen.has(b.id) - chosen.has(a.id));
   list.replaceChildren(...ordered.map((it) => {
     const box = element("input", { type: "checkbox", checked: chosen.has(it.id), onchange: () => {

@@ -68,7 +68,7 @@ async function look() {
   } catch (error) {
     complain(error, "look");
   }
-  // The next request starts when this one has ended, so a slow server gets fewer.
+  // The next request starts when this one has ended, so a slow server gets fewer requests.
   setTimeout(look, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
 }
 

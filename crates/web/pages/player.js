@@ -177,7 +177,7 @@ export class Player {
       Object.assign(playButton, { textContent: sign, title });
       playButton.setAttribute("aria-label", title);
     }
-    // A text that is set again is laid out again, which takes longer than a frame's drawing.
+    // Setting a text again lays it out again, which takes longer than drawing a frame.
     const speed = `${clock.speed}/s`;
     if (this.speedText.textContent !== speed) this.speedText.textContent = speed;
     this.recordButton?.update();

@@ -36,7 +36,7 @@ export function robotPanel(episode, view, seek, choose, id) {
     if (kind.has_network) node.append(element("h3", {}, "Neurons"), map("neurons", episode.ensembles));
   };
 
-  /** Its actions in this step, as a list. */
+  /** The actions of the robot in this step, as a list. */
   const facts = () => {
     const list = element("dl", {});
     const fact = (name, text, part) => {
@@ -89,7 +89,7 @@ export function robotPanel(episode, view, seek, choose, id) {
     return [`robot ${emitter}${by}: `, ...[said].flat(), `, signal ${decimals(signal, 4)}`];
   };
 
-  /** A map of a robot's values over all steps, group by group, with those of this step. */
+  /** A map of a robot's values over all steps, group by group, with the values of this step. */
   const map = (name, groups) => {
     const box = element("div", { className: "map" });
     let row = shown * (episode.columns[name].n_rows / episode.n_robots);

@@ -51,7 +51,7 @@ const FEW = ["#4269d0", "#e0571c", "#2f9a44", "#a463f2", "#b98a00", "#0a9396", "
 const DASHES = ["", "7 4", "2 3"];
 const LIGHTNESS = [0.42, 0.58, 0.5];
 
-/** Colour and dashes of series `i` of `n`: no two of up to hundreds are alike. */
+/** Colour and dashes of series `i` of `n`: no two of hundreds of series are alike. */
 export function seriesStyle(i, n) {
   if (n <= FEW.length) return { color: FEW[i], dash: "" };
   // Neighbours rarely share a hue, and then have different dashes.

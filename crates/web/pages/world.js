@@ -149,8 +149,8 @@ export class World {
     context.setLineDash([]);
   }
 
-  /** Ground areas and lights. On a torus an image is the nearest one within half a world around it,
-   *  so it is cut off there: the next image covers places beyond. */
+  /** Ground areas and lights. On a torus, an image is drawn only within half a world around it,
+   *  where it is the nearest one; beyond, the next image is nearer. */
   drawPlaces(context) {
     const { camera, episode, view } = this;
     const [halfX, halfY] = [(episode.width / 2) * camera.scale, (episode.height / 2) * camera.scale];

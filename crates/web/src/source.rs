@@ -50,11 +50,11 @@ pub struct Assignment {
     pub worker_id: u64,
     /// The name of the worker.
     pub worker_name: String,
-    /// None for an evaluation.
+    /// Number of the experiment; none for an evaluation.
     pub experiment: Option<u64>,
-    /// The name of its batch, for people.
+    /// The name of the batch, for people.
     pub batch: String,
-    /// Its individual within the batch.
+    /// The individual within the batch.
     pub individual: u32,
     /// The trials of the individual.
     pub trials: Range<u32>,
@@ -64,7 +64,7 @@ pub struct Assignment {
     pub ended_for: Duration,
     /// Time of computing; zero without a result.
     pub busy: Duration,
-    /// Its outcome.
+    /// The outcome of the assignment.
     pub fate: Fate,
 }
 

@@ -1,4 +1,4 @@
-//! The trials of which a replay shows one: the fitness of each, and the median trial.
+//! The trials of an individual, one of which a replay shows: their fitness, and the median trial.
 
 use serde::Serialize;
 use sim_core::{EvaluateError, Simulation, TrialSet};
@@ -7,8 +7,8 @@ use swarm_proto::v1::JudgedFitness;
 /// The trials that define the fitness of an individual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trials {
-    /// Whether they are the trials of its judgement, which selected nothing; else they are
-    /// those of its generation.
+    /// Whether these are the trials of the judgement, which selected nothing, instead of those of
+    /// its generation.
     is_judgement: bool,
     generation: u64,
     /// The fitness of each trial, in their order.
@@ -50,7 +50,7 @@ impl Trials {
             generation,
             mean: fitness.iter().sum::<f64>() / fitness.len().max(1) as f64,
             interval: None,
-            // Of two middle values, the lower one.
+            // The lower one of two middle values.
             median: nth(last / 2),
             worst: nth(0),
             best: nth(last),
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_median_is_a_trial_and_the_lower_one_of_two() {
+    fn of_two_middle_trials_the_median_is_the_lower_one() {
         let worst_median_best = |fitness: &[f64]| {
             let trials = Trials::of_generation(3, fitness.to_vec());
             (trials.worst, trials.median, trials.best)

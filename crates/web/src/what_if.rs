@@ -25,7 +25,7 @@ pub struct WhatIf {
     pub steps: Option<u32>,
     /// Number of robots of the evolving object.
     pub robots: Option<u32>,
-    /// A reading that all of them lack, such as `wireless_receiver:msg`.
+    /// A reading that all these robots lack, such as `wireless_receiver:msg`.
     pub inhibit: Option<String>,
     /// A perturbation with its default parameters: `leader_failure` or `topology_switch`.
     pub perturb: Option<String>,
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_changes_unless_it_is_asked_for() {
+    fn nothing_changes_without_a_request() {
         assert_eq!(WhatIf::default().apply(quickstart()), Ok(quickstart()));
     }
 
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_refused() {
+    fn senseless_changes_are_refused() {
         let refused = |what_if: WhatIf| what_if.apply(quickstart()).unwrap_err().to_string();
         let error = refused(WhatIf { robots: Some(0), ..WhatIf::default() });
         assert!(error.contains("num_instances"), "{error}");

@@ -3,7 +3,7 @@
     python crates/web/tests/browser.py target/debug
 
 The argument is the folder with coordinator, worker and swarmctl; `harness.py` describes its other
-options. Without Chromium and its driver the tests are skipped, with a line that says so.
+options. Without Chromium and its driver it prints a line, and skips the tests.
 """
 
 import csv
@@ -66,7 +66,7 @@ class Pages(BrowserTest):
         ).click().perform()
         self.wait(lambda: self.browser.current_url.split("#")[0].endswith("/replay/1@0/0"), "no replay")
         self.wait_for_text("h1", "Individual 0 of generation 0 of experiment 1")
-        # It plays by itself.
+        # The episode plays by itself.
         self.wait_for_text("#step", "step 99 of 99")
 
     def test_a_chart_zooms(self):
@@ -81,7 +81,7 @@ class Pages(BrowserTest):
         webdriver.ActionChains(self.browser).double_click(chart).perform()
         self.wait(lambda: labels() == whole, "a double click does not show all")
 
-    def test_the_best_of_each_generation_are_on_top_if_wished(self):
+    def test_the_best_individuals_are_on_top_on_request(self):
         self.open("/experiment/1")
         canvas = self.find(".heat-map canvas")
         self.wait(lambda: canvas.size["height"] > 100, "the map is empty")
@@ -109,7 +109,7 @@ class Pages(BrowserTest):
         self.assertEqual([fitness for _, fitness in best_first], sorted((it[1] for it in as_numbered), reverse=True))
         self.assertEqual(set(best_first), set(as_numbered))
 
-    def test_the_distribution_is_seen_when_somebody_asks(self):
+    def test_the_distribution_is_shown_on_request(self):
         csv_text = self.fleet.swarmctl("history", "1", "--dynamics")
         last = json.loads(csv_text)[-1]
         self.open("/experiment/1")
@@ -172,7 +172,7 @@ class Pages(BrowserTest):
         self.wait_for_text("main", "1 worker with 1 slot")
         self.picture("fleet")
 
-    def test_pages_keep_the_rules_for_those_who_do_not_see_them(self):
+    def test_pages_keep_the_rules_of_accessibility(self):
         self.browser.set_script_timeout(DEADLINE)
         for narrow in [False, True]:
             if narrow:
@@ -221,7 +221,7 @@ class Live(BrowserTest):
         self.wait(lambda: n_generations() == 40, "generations are missing")
         self.wait_for_text(".state", "completed")
 
-    def test_the_timeline_shows_who_computes_and_what_was_lost(self):
+    def test_the_timeline_shows_computed_and_lost_assignments(self):
         fleet = Fleet()
         self.addCleanup(fleet.stop)
         workers = [fleet.start_worker(name) for name in ["left", "right"]]
@@ -236,7 +236,7 @@ class Live(BrowserTest):
         left, right = workers
         left.terminate()
         left.wait()
-        # Alone and stopped, it holds items that no other worker computes.
+        # The stopped worker is alone: no other worker computes its items.
         right.send_signal(signal.SIGSTOP)
         held = """return fetch('/api/timeline').then((it) => it.json()).then(({ workers, assignments }) =>
             assignments.filter((it) => it[8] === 'unanswered' && workers[it[0]][1] === 'right').map((it) => it.slice(2, 5)))"""
@@ -254,8 +254,8 @@ class Live(BrowserTest):
         self.assertLessEqual(self.width(), NARROW)
         self.picture("narrow-timeline")
 
-    def test_pages_are_encrypted_where_the_coordinator_is(self):
-        """The certificate is self-made, so the browser is told to accept it."""
+    def test_pages_use_the_encryption_of_the_coordinator(self):
+        """The certificate is self-signed, so the test tells the browser to accept it."""
         self.browser.execute_cdp_cmd("Security.setIgnoreCertificateErrors", {"ignore": True})
         self.expected_complaints = ["401 (Unauthorized)"]
         with tempfile.TemporaryDirectory() as directory:
@@ -289,7 +289,7 @@ class Live(BrowserTest):
         self.find("#do-resume").click()
         self.wait_for_text(".state", "running")
 
-    def test_an_experiment_gets_weight_is_forked_and_cancelled_once_that_is_confirmed(self):
+    def test_an_experiment_is_weighted_forked_and_cancelled_after_confirmation(self):
         fleet = Fleet()
         self.addCleanup(fleet.stop)
         fleet.start_worker()
@@ -321,7 +321,7 @@ class Live(BrowserTest):
         self.wait(lambda: self.browser.current_url.endswith("/experiment/2"), "no fork is shown")
         self.wait_for_text("main", "quickstart")
 
-    def test_a_newcomer_sees_the_first_swarm_and_the_last(self):
+    def test_a_newcomer_sees_the_first_and_the_last_swarm(self):
         directory = tempfile.TemporaryDirectory()
         self.addCleanup(directory.cleanup)
         command = [PROGRAMS / "swarmctl", "run", CONFIG, "--web", "--data-dir", directory.name]
@@ -365,7 +365,7 @@ class Live(BrowserTest):
             field.send_keys(token, Keys.ENTER)
             if token == WORKER_TOKEN:
                 self.wait_for_text("#problem", "this is not the client token")
-        # At the address that was opened.
+        # The login leads to the address that was opened.
         self.wait_for_text("main", "No worker is connected")
         self.assertEqual(self.browser.current_url, fleet.pages + "/fleet")
         self.assertEqual(self.script("return document.cookie"), "", "a script can read the cookie")

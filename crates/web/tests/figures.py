@@ -128,7 +128,7 @@ class Figures(BrowserTest):
         self.assertIn(f"elite: {2 * (n_generations - 1)}, ", self.text(".families .keys"))
         self.script("document.querySelector('.families').scrollIntoView()")
         self.picture("families")
-        # The same births as in the client's answer.
+        # The page has the same births as `swarmctl lineage`.
         told = json.loads(self.fleet.swarmctl("lineage", f"{run}@5/9", "--depth", "1"))["populations"][0]["ancestors"]
         rows = list(csv.DictReader(io.StringIO(self.saved(".families .save:last-child"))))
         self.assertEqual(len(rows), n_children)
@@ -196,7 +196,7 @@ class Figures(BrowserTest):
             """, n)
             self.assertEqual(len(set(looks)), n)
 
-    def test_groups_are_compared_as_the_client_does_and_files_by_their_keys(self):
+    def test_groups_are_compared_as_by_the_client_and_files_by_their_keys(self):
         first = 1 + len(json.loads(self.fleet.swarmctl("list")))
         self.fleet.swarmctl("submit", str(CONFIG), "--generations", "2", "--group", "sizes", "--set", "algorithm.population_size=8,16", "--seeds", "0..2")
         self.fleet.swarmctl("watch", "--quiet", "sizes")
@@ -215,7 +215,7 @@ class Figures(BrowserTest):
         self.assertEqual(rows, ["8"] * 3 + ["16"] * 3)
         self.picture("compare-groups")
 
-    def test_swept_values_are_seen_beside_what_champions_are_worth(self):
+    def test_swept_values_are_shown_beside_the_worth_of_champions(self):
         before = len(json.loads(self.fleet.swarmctl("list")))
         self.fleet.swarmctl("submit", str(CONFIG), "--generations", "2", "--group", "swept", "--set", "algorithm.population_size=8,16", "--seeds", "0..2")
         self.fleet.swarmctl("watch", "--quiet", "swept")
@@ -255,7 +255,7 @@ class Figures(BrowserTest):
         self.find(".differences")
         self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, ".swept"), [], "five runs say nothing")
 
-    def test_keys_go_through_the_timeline_and_it_is_saved(self):
+    def test_keys_go_through_the_timeline_and_a_button_saves_it(self):
         fleet = Fleet()
         self.addCleanup(fleet.stop)
         for name in ["left", "right"]:

@@ -1,11 +1,11 @@
-"""Measures frames per second of a replay in headless Chromium, and the use of the time.
+"""Measures the frames per second of a replay in headless Chromium, and where the time goes.
 
     target/python/bin/python crates/web/tests/frames.py target/debug [--profile]
 
-The argument is the folder with swarmctl. Trails and who hears whom, and then the reach of all
-radios, too, are shown while 50 and 500 robots play. With --profile it also prints the
-functions that took most time. Without a graphics card, all is drawn by the processor. With
-SWARM_SCREENSHOTS=DIR step 60 is pictured there.
+The argument is the folder with swarmctl. The script plays 50 and 500 robots with trails and received
+messages, and once more with the reach of all radios. --profile also prints the functions that took
+most time. Without a graphics card, the processor draws everything. SWARM_SCREENSHOTS=DIR writes a
+picture of step 60 there.
 """
 
 import collections
@@ -40,7 +40,7 @@ COUNTER = """
 
 class Frames(BrowserTest):
     def swarm(self, directory, n_robots):
-        """A file with robots that drive in all of their world, and hear each other."""
+        """A replay file of robots that drive through their whole world and hear each other."""
         config = json.loads((ROOT / "configs/light_follower_snes.json").read_text())
         robots = config["world"]["objects"]["robotA"]
         robots["num_instances"] = n_robots

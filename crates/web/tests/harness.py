@@ -1,8 +1,7 @@
 """The common parts of tests and measurements of pages: programs, a fleet, a browser.
 
 The first argument is the folder with coordinator, worker and swarmctl. Without Chromium and its
-driver the script ends at once, with a line that says so. With SWARM_SCREENSHOTS=DIR, pages
-are also pictured there.
+driver the script prints a line and ends. SWARM_SCREENSHOTS=DIR also takes pictures of pages there.
 """
 
 import json
@@ -61,10 +60,10 @@ class Fleet:
         listen, pages = (f"127.0.0.1:{port}" for port in self.ports)
         command = ["coordinator", "--listen", listen, "--web-listen", pages]
         self.coordinator = self.start(*command, "--data-dir", self.directory.name, *self.args)
-        # The line before tells that it listens for clients.
+        # An earlier line says that the coordinator listens for clients.
         for line in self.coordinator.stderr:
             if "pages are served" in line:
-                # A program that writes into a full pipe waits for its reader.
+                # Somebody must read the pipe: a program that writes into a full one waits.
                 threading.Thread(target=self.coordinator.stderr.read, daemon=True).start()
                 return
         raise AssertionError("the coordinator does not start")
@@ -140,8 +139,8 @@ class BrowserTest(unittest.TestCase):
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
     def width(self):
-        """The width of the whole page; a phone shrinks a page that is too wide, so its window
-        grows."""
+        """The width of the whole page: a phone shrinks a page that is too wide, and so widens its
+        window."""
         return self.script("return document.documentElement.scrollWidth")
 
     def wait(self, condition, what):

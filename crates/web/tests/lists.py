@@ -1,4 +1,4 @@
-"""The list of experiments of people with many runs; called like `browser.py`."""
+"""The list of many experiments in a real browser; called like `browser.py`."""
 
 import csv
 import gzip
@@ -15,12 +15,12 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 N_JUDGED, N_STILL, N_RUNNING = 10, 250, 50
-# Answer to a click in the middle, ms; the slowest depends on the machine's other work.
+# Maximum of the median time to answer a click, ms. The slowest answer depends on other work of the machine.
 ANSWER_MAX = 100
 
 
 class Lists(BrowserTest):
-    """Of 310 experiments, 50 change."""
+    """A list of 310 experiments, of which 50 change."""
 
     @classmethod
     def setUpClass(cls):
@@ -52,7 +52,7 @@ class Lists(BrowserTest):
         with urllib.request.urlopen(request, timeout=DEADLINE) as answer:
             return answer.headers, answer.read()
 
-    def test_a_page_is_sent_what_changed_and_long_answers_are_packed(self):
+    def test_a_page_gets_only_changes_and_long_answers_are_compressed(self):
         headers, packed = self.asked("/api/experiments", **{"Accept-Encoding": "gzip"})
         whole = gzip.decompress(packed)
         self.assertEqual(headers["Content-Encoding"], "gzip")
@@ -105,7 +105,7 @@ class Lists(BrowserTest):
         self.assertEqual(asked, 0, "the whole list is asked for again")
         print(f"a click is answered within {statistics.median(answers):.0f} ms, at most {max(answers):.0f} ms")
 
-    def test_a_list_is_sorted_filtered_and_has_chosen_columns_which_the_address_keeps(self):
+    def test_the_address_keeps_the_order_the_filter_and_the_columns_of_a_list(self):
         self.open("?q=group%3Djudged")
         self.assertEqual(self.ids(), list(range(N_JUDGED, 1, -1)))
         self.find("th [data-column=champion]").click()
@@ -142,7 +142,7 @@ class Lists(BrowserTest):
         self.assertIn("sort=-champion", self.browser.current_url)
         self.assertLessEqual(self.width(), NARROW)
 
-    def test_what_is_listed_is_saved_as_a_table(self):
+    def test_the_list_is_saved_as_a_table(self):
         self.open("?q=group%3Djudged&sort=-champion&show=champion,recent,labels")
         shown = self.ids()
         rows = list(csv.DictReader(io.StringIO(self.saved(".save"))))

@@ -36,7 +36,7 @@ class Replays(BrowserTest):
     def texts(self, selector):
         return self.script(f"return [...document.querySelectorAll('{selector}')].map((it) => it.textContent)")
 
-    def test_simulating_again_in_any_form_leaves_a_page_that_answers(self):
+    def test_the_page_answers_after_every_kind_of_new_simulation(self):
         def press(selector):
             self.find(selector).click()
 
@@ -81,7 +81,7 @@ class Replays(BrowserTest):
         self.script("document.querySelector('.strip').focus()")
         webdriver.ActionChains(self.browser).send_keys(Keys.ARROW_RIGHT, Keys.ENTER).perform()
         self.wait_for_text(".episode", f"trial {second} of its judgement")
-        # The simulation gives the bits of one of them.
+        # The simulated episode has the fitness of that trial.
         self.assertIn(f"this trial {fitness[second]:.4f}", self.text("#result"))
 
     def test_trials_and_steps_are_saved(self):
@@ -118,13 +118,13 @@ class Replays(BrowserTest):
         self.assertEqual(self.script("return [...new Uint8Array(saved, 0, 4)]"), [0x1A, 0x45, 0xDF, 0xA3])
         self.assertEqual(self.text("#record"), "● video")
 
-    def test_neighbours_are_those_that_there_are(self):
+    def test_only_existing_neighbours_have_links(self):
         self.open("/replay/1@0/0#step=1")
         self.wait(lambda: self.texts("main > p a") == ["experiment 1", "individual ›", "generation ›", "champion"], "before the first one")
         self.open("/replay/1@5/31#step=1")
         self.wait(lambda: self.texts("main > p a") == ["experiment 1", "‹ individual", "‹ generation", "champion"], "after the last one")
 
-    def test_a_file_of_a_champion_says_which_trial_it_plays_and_what_it_is_worth(self):
+    def test_the_file_of_a_champion_names_its_trial_and_its_worth(self):
         html = pathlib.Path(self.fleet.directory.name) / "champion.html"
         self.fleet.swarmctl("replay", "1", "--to", str(html))
         self.browser.get(html.as_uri())
@@ -157,7 +157,7 @@ class Replays(BrowserTest):
             """)
             self.assertGreater(shades, 100, "images of a lamp add up")
 
-    def test_the_form_has_todays_values_and_marks_what_is_changed(self):
+    def test_the_form_has_the_present_values_and_marks_changes(self):
         self.open("/replay/1#step=5")
         value = lambda name: self.find(f"#what-if-{name}").get_attribute("value")
         self.wait_for_text(".what-if", "robots")
@@ -214,7 +214,7 @@ class Replays(BrowserTest):
         self.assertLessEqual(drawn, 49)
         self.assertGreaterEqual(drawn, 9)
 
-    def test_two_side_by_side_are_locked_and_stay_so(self):
+    def test_two_players_side_by_side_stay_in_step(self):
         self.open("/replay/1#step=50")
         self.wait_for_text(".episode", "5 robots")
         self.find("#what-if-robots").send_keys(Keys.BACKSPACE, "9")
@@ -290,7 +290,7 @@ class Replays(BrowserTest):
         self.find("#what-if-seed").send_keys("3", Keys.ARROW_LEFT, Keys.HOME)
         self.assertEqual(self.text(".step"), "step 7 of 99")
 
-    def test_a_screen_reader_hears_what_play_does_and_not_each_step(self):
+    def test_a_screen_reader_hears_the_play_button_and_not_each_step(self):
         self.open("/replay/1#step=5")
         play = self.find("#play")
         self.assertEqual(play.get_attribute("aria-label"), "play (Space)")

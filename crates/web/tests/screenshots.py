@@ -1,8 +1,8 @@
-"""The pictures of docs/web.md and docs/gallery.md: present pages and replays, in docs/figures.
+"""Makes the pictures of docs/web.md and docs/gallery.md anew: pages and replays, in docs/figures.
 
     target/python/bin/python crates/web/tests/screenshots.py target/debug
 
-Called like `browser.py`. It is not a test: it replaces the files.
+Call it like `browser.py`. It is no test: it replaces the files.
 """
 
 import json
@@ -15,7 +15,7 @@ from harness import CONFIG, PROGRAMS, BrowserTest, Fleet
 
 ROOT = CONFIG.parents[1]
 FIGURES = ROOT / "docs/figures"
-# A replay's figure: its published run, and the shown step and robot.
+# For the figure of each replay: the published run, and the shown step and robot.
 REPLAYS = {
     "leader": ("leader_selection_snes", 60, 3),
     "border": ("borderline_snes", 120, 13),
@@ -24,7 +24,7 @@ REPLAYS = {
 }
 
 
-# Tasks of docs/gallery.md: the shown trial.
+# The shown trial of each task of docs/gallery.md.
 TASKS = {
     "foraging": 0, "division_of_labour": 0, "flocking": 0, "synchronisation": 0,
     "aggregation": 0, "dispersion": 0, "chain": 0, "predator": 1,
@@ -42,7 +42,7 @@ def replay(*args):
 
 class Screenshots(BrowserTest):
     def shoot(self, name, width, height, part="body"):
-        """`part`: the element at the top."""
+        """Writes a picture of the page. `part`: the element at its top."""
         self.prefer("light")
         self.browser.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
@@ -104,12 +104,12 @@ class Screenshots(BrowserTest):
         self.shoot("pages-families", 1100, 640, ".families")
         fleet.swarmctl("submit", str(CONFIG), "--generations", "100000")
         self.browser.get(fleet.pages + "/fleet")
-        # Until the timeline shows only this.
+        # Waits until the timeline shows only this experiment.
         done = "return fetch('/api/experiments/11').then((it) => it.json()).then((it) => it.experiment.generations_done)"
         self.wait(lambda: self.script(done) > 70, "it does not go on")
         workers[3].kill()
         self.wait_for_text(".broken", "worker-3: lost with its worker")
-        self.wait_for_text("main", "episodes, since")
+        self.wait_for_text("main", " episodes in ")
         self.shoot("pages-fleet", 1400, 620)
 
 

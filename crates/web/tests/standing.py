@@ -31,7 +31,7 @@ class Standing(BrowserTest):
         self.wait_for_text("h1", "Experiments")
         self.wait_for_text("#connection", "live")
 
-    def test_what_is_unknown_or_deleted_is_said_with_a_way_on(self):
+    def test_an_unknown_or_deleted_experiment_is_reported_with_a_link(self):
         self.expected_complaints = ["404 (Not Found)", "400 (Bad Request)", "ERR_INCOMPLETE_CHUNKED"]
         fleet = Fleet()
         self.addCleanup(fleet.stop)
@@ -50,7 +50,7 @@ class Standing(BrowserTest):
         self.browser.refresh()
         self.wait_for_text("main h1", "There is no experiment 1")
 
-    def test_before_the_first_generation_the_page_says_what_happens(self):
+    def test_before_the_first_generation_the_page_shows_the_progress(self):
         fleet = Fleet()
         self.addCleanup(fleet.stop)
         fleet.swarmctl("submit", str(CONFIG))

@@ -12,7 +12,8 @@ pub enum Form {
     Short(f64),
     /// Multiples of a number in 8 bits.
     Byte(f64),
-    /// In 8 bits, as a share of the column's greatest value: 0.01 if all lie in \[-1, 1\].
+    /// Shares of the column's greatest value in 8 bits; multiples of 0.01 if all values lie in
+    /// \[-1, 1\].
     Reading,
     /// 32-bit floating point; NaN for missing values.
     Real,
@@ -38,20 +39,20 @@ enum Values {
 #[derive(Debug, Serialize)]
 pub struct Place {
     name: &'static str,
-    /// Of the array: `i8`, `i16`, `i32` or `f32`.
+    /// Type of the array: `i8`, `i16`, `i32` or `f32`.
     #[serde(rename = "type")]
     kind: &'static str,
     /// Bytes from the end of the header.
     offset: usize,
     n_rows: usize,
-    /// The value of the number 1.
+    /// The value of the stored number 1.
     scale: f64,
     /// Whether steps are differences from the previous step.
     is_difference: bool,
 }
 
 impl Form {
-    /// The value of the number 1, if it does not depend on the values.
+    /// The value of the stored number 1, if it does not depend on the values.
     fn scale(self) -> f64 {
         match self {
             Self::Position => 0.01,
@@ -71,7 +72,7 @@ impl Form {
 }
 
 impl Column {
-    /// All zero.
+    /// A column of zeros.
     pub fn new(name: &'static str, form: Form, n_rows: usize, n_steps: usize) -> Self {
         let n = n_rows * n_steps;
         let values = match form {

@@ -60,7 +60,7 @@ pub enum ReplayError {
         n_values / 1_000_000
     )]
     TooLong {
-        /// Its number of values: steps times robots times values per robot.
+        /// Number of values of the episode: steps times robots times values per robot.
         n_values: usize,
     },
 }
@@ -111,7 +111,7 @@ impl Replay {
         Ok(Self { scene, summary, columns: columns.into_vec() })
     }
 
-    /// The same replay, with the trials of which it shows one.
+    /// The same replay, with all trials of the individual, one of which it shows.
     #[must_use]
     pub fn of_trials(mut self, trials: Trials) -> Self {
         self.scene.trials = Some(trials);
@@ -139,7 +139,7 @@ impl Replay {
 
 /// The columns of an episode, step by step.
 struct Columns {
-    /// As [`ROBOT_COLUMNS`].
+    /// In the order of [`ROBOT_COLUMNS`].
     robots: Vec<Column>,
     lights: [Column; 2],
     areas: [Column; 2],

@@ -14,11 +14,11 @@ pub struct RobotColumn {
     pub read: fn(&RobotRecord, &mut Vec<f64>),
 }
 
-/// Of values in \[-1, 1\].
+/// The form of values in \[-1, 1\].
 const SHARE: Form = Form::Byte(0.01);
 const NUMBER: Form = Form::Byte(1.0);
 const ROBOT: Form = Form::Short(1.0);
-/// Radians.
+/// The form of angles, in radians.
 const ANGLE: Form = Form::Short(0.001);
 
 /// A column of one value per robot.

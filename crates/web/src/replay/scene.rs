@@ -50,7 +50,7 @@ struct Robots {
     emits_within: Option<f64>,
     /// cm; none without a receiver.
     hears_within: Option<f64>,
-    /// Of the receiver.
+    /// Number of sectors of the receiver.
     n_sectors: u32,
     /// Levels of a component of a message; none if it is not quantised.
     n_levels: Option<u32>,
@@ -71,7 +71,7 @@ struct Rows {
 /// A light, or a ground area.
 #[derive(Debug, Serialize)]
 pub struct Disc {
-    /// The object's, such as `nest`.
+    /// The name of its object, such as `nest`.
     name: String,
     color: String,
     /// cm

@@ -118,7 +118,7 @@ fn evaluated<'a>(
 }
 
 #[test]
-fn what_a_browser_cannot_hold_is_refused() {
+fn an_episode_too_large_for_a_browser_is_refused() {
     let mut config = quickstart();
     config.algorithm.evaluation_steps = 100_000;
     if let Some(ObjectConfig::Robot(robot)) = config.world.objects.get_mut("robot") {
@@ -132,7 +132,7 @@ fn what_a_browser_cannot_hold_is_refused() {
 }
 
 #[test]
-fn a_replay_says_who_carries_something_and_who_has_failed() {
+fn a_replay_shows_robots_that_carry_something_or_have_failed() {
     let config = quickstart();
     let simulation = Simulation::compile(&config).unwrap();
     let genotype = vec![0.6; simulation.genotype_len()];

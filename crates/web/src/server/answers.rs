@@ -28,9 +28,9 @@ pub struct ExperimentAnswer {
     submitted_at_ms: u64,
     best: Option<f64>,
     mean: Option<f64>,
-    /// On trials that selected nothing.
+    /// Fitness of the champion on trials that selected nothing.
     champion: Option<f64>,
-    /// On the trials that selected it.
+    /// Fitness of the champion on the trials that selected it.
     selection: Option<f64>,
     priority: u32,
     digest: String,

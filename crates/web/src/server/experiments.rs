@@ -105,7 +105,7 @@ pub async fn dynamics(
 pub struct WantedFamilies {
     #[serde(default)]
     from: u64,
-    /// Only generations whose number it divides.
+    /// The stride: the answer has the generations whose numbers it divides.
     #[serde(default = "all")]
     every: NonZeroU64,
 }

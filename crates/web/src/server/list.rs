@@ -63,7 +63,7 @@ struct Row {
     text: Option<String>,
 }
 
-/// The answer to a page with some version.
+/// The answer to a page that has some version of the list.
 #[derive(Debug)]
 struct Changes {
     mark: String,
@@ -185,7 +185,7 @@ pub async fn all(
     Ok(([(CONTENT_TYPE, "application/json")], changes.to_json()).into_response())
 }
 
-/// The same as a stream, with an event at every change. The id of an event is the resulting
+/// The list as a stream, with an event at every change. The id of an event is the resulting
 /// version, so a page continues without a gap after it was cut off.
 pub async fn live(
     State(shared): State<Shared>,

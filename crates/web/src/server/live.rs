@@ -33,18 +33,18 @@ const LATEST_MAX: usize = 256;
 #[derive(Debug, Default)]
 pub struct Latest(Mutex<Known>);
 
-/// By the number of the experiment and the first requested generation: the count of writes
-/// at that time, and the answer.
+/// For each experiment and first requested generation: the count of writes at the time of the
+/// answer, and the answer.
 type Known = BTreeMap<(u64, u64), (u64, Arc<News>)>;
 
 /// The news of an experiment.
 #[derive(Debug)]
 struct News {
-    /// As JSON.
+    /// The experiment as JSON.
     experiment: String,
-    /// As JSON; none without new generations.
+    /// New generations as JSON, if there are any.
     generations: Option<String>,
-    /// The generation after the last of them.
+    /// The generation after the last one in `generations`.
     next: u64,
     /// Whether more generations are already stored.
     is_cut: bool,

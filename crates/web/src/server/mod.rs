@@ -1,5 +1,5 @@
-//! The pages over HTTP: access to them, and their content. All decisions are made
-//! elsewhere.
+//! The pages over HTTP: access to them, and their content. This module decides nothing about
+//! experiments.
 
 mod access;
 mod answers;

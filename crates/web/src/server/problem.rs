@@ -59,7 +59,7 @@ impl IntoResponse for Problem {
     }
 }
 
-/// The parameters in an address, or a line on their error.
+/// The parameters in an address, or a line about their error.
 #[derive(Debug)]
 pub struct Path<T>(pub T);
 

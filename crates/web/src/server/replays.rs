@@ -28,7 +28,7 @@ use crate::{
 #[derive(Debug, Default)]
 pub struct Judgements(Mutex<BTreeMap<(u64, u64), Judgement>>);
 
-/// Its trials, once requested.
+/// The trials of a judgement, once requested.
 type Judgement = Arc<OnceCell<Trials>>;
 
 /// Number of judgements that are cached for other pages.
@@ -83,7 +83,7 @@ impl Subject {
         Ok((config, simulation))
     }
 
-    /// Its trials: those of its judgement, or else of its generation.
+    /// The trials of its judgement, or else of its generation.
     async fn trials(&self, shared: &Shared) -> Result<Trials, Problem> {
         let GetChampionResponse { generation, trial_fitness, judged, .. } = &self.individual;
         let Some(judged) = judged.filter(|judged| judged.trials > 0) else {

@@ -69,7 +69,7 @@ const HERE: &str = "127.0.0.1:7780";
 const ORIGIN: Option<&str> = Some("http://127.0.0.1:7780");
 
 #[tokio::test]
-async fn only_those_who_have_shown_the_token_see_anything() {
+async fn only_browsers_with_the_token_see_anything() {
     let list = "/api/experiments";
     let refused = answer(HERE, Some(TOKEN), get(list, HERE, "")).await;
     assert_eq!(refused.status(), StatusCode::UNAUTHORIZED);
@@ -133,7 +133,7 @@ async fn browsers_load_nothing_from_elsewhere() {
 }
 
 #[tokio::test]
-async fn what_went_wrong_is_said_in_one_line() {
+async fn every_error_is_one_line() {
     for (path, status, part) in [
         ("/api/experiments/9", StatusCode::NOT_FOUND, "there is no experiment 9"),
         ("/api/replay/1", StatusCode::CONFLICT, "has no champion yet"),
@@ -161,7 +161,7 @@ async fn what_went_wrong_is_said_in_one_line() {
 }
 
 #[tokio::test]
-async fn heads_are_told_what_they_would_get() {
+async fn head_requests_get_the_headers_of_the_answer() {
     let head = |path: &str| {
         let request = Request::head(path).header("host", HERE);
         request.body(Body::empty()).unwrap()
@@ -179,9 +179,9 @@ async fn heads_are_told_what_they_would_get() {
     }
 }
 
-/// A database calls an interrupted run running.
+/// A database has an interrupted run as running.
 #[tokio::test]
-async fn only_where_a_coordinator_is_something_runs() {
+async fn without_a_coordinator_no_experiment_runs() {
     let list = text(answer(HERE, None, get("/api/experiments", HERE, "")).await).await;
     assert!(list.contains(r#""state":"unfinished""#), "{list}");
     let beside_a_coordinator = json!(answers::ExperimentAnswer::new(running(), true));
