@@ -1,8 +1,8 @@
 """Measures the time of all 10,000 counterfactuals of experiment A: ``python
 python/benches/counterfactuals.py``.
 
-Replaces every message and every radio reading of ten robots in 20 steps of 50 trials; in one thread, and with
-the robots split between two.
+Replaces every message and every radio reading of ten robots in 20 steps of 50 trials, first in one thread, then
+with the robots split between two threads.
 """
 
 import json

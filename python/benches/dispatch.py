@@ -1,9 +1,9 @@
 """Measures the cost of driving a fleet from Python: ``python python/benches/dispatch.py PROGRAMS``.
 
-Alternates generations of a run of leader selection, 100 individuals, with ``Client.evaluate`` of as
-many genotypes in the same trials, on a coordinator and two workers of one slot; with episodes of one
-step and one trial, which take almost no time, and with those of the file. ``PROGRAMS``: the directory
-of the release programs ``coordinator`` and ``worker``.
+On a coordinator and two workers of one slot, alternates generations of 100 individuals of leader
+selection with ``Client.evaluate`` of 100 genotypes in the same trials. Measures episodes of one step and one
+trial, which take almost no time, and those of the file. ``PROGRAMS``: the directory of the release
+programs ``coordinator`` and ``worker``.
 """
 
 import os
@@ -42,11 +42,11 @@ def main(programs: str) -> None:
             report(f"{what}: a generation of a run, ms", inside)
             report(f"{what}: Client.evaluate, ms", outside)
             ratios = [ours / theirs for ours, theirs in rounds]
-            report(f"{what}: rate, of the run's", ratios)
+            report(f"{what}: share of the run's rate", ratios)
 
 
 def both(started: Fleet, file: dict, seed: int) -> tuple[float, float]:
-    """Milliseconds of a generation, made by the coordinator and by a client."""
+    """Milliseconds of a generation of the coordinator, and of one that a client drives."""
     file["seed"] = seed
     experiment = swarmevo.Experiment.from_dict(file)
     with started.connect() as client:

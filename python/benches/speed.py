@@ -1,7 +1,7 @@
 """Measures the speed of the package's simulation: ``python python/benches/speed.py SWARMCTL``.
 
-Times a trace as arrays, and alternates ``evaluate`` with ``swarmctl bench``, so that both meet the
-same load. ``SWARMCTL`` is the release program of the same sources.
+Measures a trace as arrays. Alternates ``evaluate`` with ``swarmctl bench``, so that both meet the
+same load of the machine. ``SWARMCTL`` is the release program of the same sources.
 """
 
 import json
@@ -36,8 +36,8 @@ def main(swarmctl: str) -> None:
 
 
 def trace_ms(clock: Callable[[], float], is_seen: bool = True) -> list[float]:
-    """Of 50 robots and 1,000 steps; the first, which warms up, does not count. ``is_seen``: with
-    all recorded values, not the fitness alone."""
+    """Milliseconds of each episode of 50 robots and 1,000 steps, without the first one, which warms up.
+    ``is_seen``: with all recorded values, instead of the fitness alone."""
     file = swarmevo.Experiment.from_file(CONFIG).to_dict()
     file["algorithm"]["evaluation_steps"] = 1000
     file["world"]["objects"]["robotA"]["num_instances"] = 50
@@ -55,7 +55,7 @@ def trace_ms(clock: Callable[[], float], is_seen: bool = True) -> list[float]:
 
 
 def package_us(n_threads: int) -> float:
-    """Wall time that a thread takes for a robot-step."""
+    """Wall time of a thread per robot-step, in microseconds."""
     experiment = swarmevo.Experiment.from_file(CONFIG)
     n_robots = experiment.to_dict()["world"]["objects"]["robotA"]["num_instances"]
     genotypes = np.random.default_rng(1).random((N_GENOTYPES, experiment.n_genes))
@@ -66,7 +66,7 @@ def package_us(n_threads: int) -> float:
 
 
 def bench_us(swarmctl: str, n_cores: int) -> float:
-    """The same for the Rust program."""
+    """The same time, measured by the Rust program."""
     command = [swarmctl, "bench", str(CONFIG), "--seconds", "1", "--cores", str(n_cores),
                "--output", "json"]
     printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout

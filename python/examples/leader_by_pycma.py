@@ -1,4 +1,4 @@
-"""pycma on leader selection: any optimiser that asks and tells.
+"""Evolves leader selection by pycma, as an example of any optimiser that asks and tells.
 
     pip install './python[all]' cma
     python python/examples/leader_by_pycma.py --generations 60
@@ -28,8 +28,9 @@ def main() -> None:
         def evaluate(genotypes, generation):
             return client.evaluate(experiment, genotypes, generation)
 
-    # Without bounds, and mirrored into [0, 1]: fast with hundreds of genes. A full covariance
-    # matrix of 424 genes learns slowly, so it is a diagonal one.
+    # Bounds would be slow with hundreds of genes, so the optimiser has none, and its samples are
+    # mirrored into [0, 1]. A full covariance matrix of 424 genes would learn slowly, so the matrix is
+    # diagonal.
     start = np.full(experiment.n_genes, 0.5)
     options = {"popsize": args.population_size, "CMA_diagonal": True, "seed": 1, "verbose": -9}
     optimiser = cma.CMAEvolutionStrategy(start, 0.3, options)

@@ -1,4 +1,4 @@
-"""MAP-Elites by pyribs on the light follower: not one controller, but a map of many.
+"""Evolves light followers by MAP-Elites of pyribs: not one controller, but a map of many.
 
     pip install './python[all]' ribs
     python python/examples/light_follower_by_pyribs.py --config configs/light_follower_snes.json

@@ -237,7 +237,7 @@ impl Evolution {
         self.0.with(py, |state| state.evolution.clone())
     }
 
-    /// Like the coordinator's evolution of the same file.
+    /// The evolution that a coordinator starts for the same file.
     pub fn of_experiment(config: &ExperimentConfig, simulation: &Simulation) -> Self {
         let segments = simulation.population_segments();
         Self::wrap(evolution::Evolution::new(config, segments, FINGERPRINT))

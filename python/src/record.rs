@@ -69,9 +69,9 @@ impl Record {
         Ok(rows.collect())
     }
 
-    /// Stores a generation: the evolution after it; the fitness of its individuals, of the
-    /// blocks of a scheduled comparison, of one at the end only, and of the judgement; and
-    /// the notices.
+    /// Stores a generation: the evolution after it, its notices, and the fitness of its
+    /// individuals, of a scheduled comparison, of a comparison that only the end causes, and
+    /// of the judgement.
     #[expect(clippy::too_many_arguments, reason = "they are one generation")]
     fn commit(
         &self,

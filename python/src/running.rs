@@ -120,8 +120,8 @@ pub fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyRe
         .map_err(|message| panic_error(py, &message))
 }
 
-/// The process in which an object was made. A forked process lacks its threads, and locks
-/// that those held stay locked.
+/// The process in which an object was made. A forked process lacks the threads of
+/// that process, and the locks that they held stay locked.
 #[derive(Clone, Copy)]
 pub struct Home(u32);
 
@@ -160,7 +160,7 @@ impl<T: Send> Shared<T> {
         done.ok_or_else(|| fork_error(py, "another thread used this when the process was forked"))
     }
 
-    /// None if a thread of the parent process held it at the fork. After a panic, the
+    /// None if a thread of the parent process held the lock at the fork. After a panic, the
     /// value is still readable.
     fn lock(&self) -> Option<MutexGuard<'_, T>> {
         if !self.home.is_left() {

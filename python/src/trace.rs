@@ -149,7 +149,7 @@ impl Recording {
         Ok(arrays.dict)
     }
 
-    /// Moves the first one and copies the others.
+    /// Appends an episode. An empty recording takes its arrays; another one copies the values.
     fn append(&mut self, other: Self) {
         join(&mut self.positions, other.positions);
         join(&mut self.headings, other.headings);

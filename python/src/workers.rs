@@ -26,7 +26,7 @@ pub struct Worker {
 
 #[pymethods]
 impl Worker {
-    /// Starts it. `slots`: number of simultaneous items, each on its own thread.
+    /// Starts a worker. `slots`: number of simultaneous items, each on its own thread.
     #[new]
     fn new(
         coordinator: &str,
@@ -46,7 +46,7 @@ impl Worker {
         Ok(Self { stop, home: Home::here(), thread: Mutex::new(Some(thread)) })
     }
 
-    /// Whether it still runs: it ends by itself only if the coordinator refuses it.
+    /// Whether the worker still runs. It ends by itself only if the coordinator refuses it.
     fn is_alive(&self) -> bool {
         if self.home.is_left() {
             return false;
@@ -55,7 +55,7 @@ impl Worker {
         thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
-    /// Tells it to finish its items and to leave.
+    /// Tells the worker to finish its items and to leave.
     fn stop(&self) {
         if self.home.is_left() {
             return;
@@ -63,7 +63,7 @@ impl Worker {
         self.stop.cancel();
     }
 
-    /// Waits for its end. Raises the reason if it ended without being told to.
+    /// Waits for the end of the worker. Raises the reason if it ended without being told to.
     fn join(&self, py: Python<'_>) -> PyResult<()> {
         if self.home.is_left() {
             return Err(fork_error(py, "the thread of this worker is in another process"));

@@ -113,7 +113,7 @@ def numbers(value: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
 
 
 def _is_small_float(array: NDArray[Any]) -> bool:
-    """Whether it has numbers of a type that is not NumPy's own, such as bfloat16."""
+    """Whether an array has numbers of a type that is not NumPy's own, such as bfloat16."""
     return array.dtype.kind == "V" and array.dtype.names is None and array.dtype.type is not np.void
 
 

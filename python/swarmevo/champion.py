@@ -52,14 +52,14 @@ class Champion:
     genotype: Floats
     """``[d]``"""
     generation: int
-    """Generation after which it was found."""
+    """Generation after which the champion was found."""
     individual: int | None
-    """Its index there; none if it is the mean of the distribution."""
+    """Index of the individual in that generation; none for the mean of the distribution."""
     trial_fitness: Floats
     """``[T]``: the fitness that made it a candidate; empty for a mean."""
     selection: Selection | None
-    """Mean on the trials that selected it among the candidates, which is optimistic, and their
-    number; none before the first comparison."""
+    """Mean on the trials that selected it among the candidates, which is optimistic, and the number
+    of these trials; none before the first comparison."""
     judged: Judged | None
     """Fitness on trials that selected nothing: mean, the 95 % interval's lower and upper end, number of
     trials; none before the end of a run, and if a trial's fitness is not finite."""

@@ -23,9 +23,9 @@ def parallel_env(experiment: Experiment) -> SwarmEnv:
 
     ``reset(seed=s)`` begins with trial 0 of the trial set of generation s, and every further ``reset()``
     moves to that of the next generation; ``options={"generation": g, "trial": t}``, with a number or a
-    :class:`TrialSet`, chooses one.
+    :class:`TrialSet`, chooses a trial.
 
-    It can be copied and pickled in any step, and used in a forked process, with the same bits.
+    The environment can be copied and pickled in any step, and used in a forked process, with the same bits.
     """
     with needs("steps"):
         from .swarm_env import SwarmEnv

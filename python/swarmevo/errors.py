@@ -72,7 +72,7 @@ class FleetError(SwarmError):
     """The coordinator has refused a request, or is unreachable.
 
     ``code`` is the name of the gRPC status, such as ``"NOT_FOUND"``; ``docs/clients.md`` explains each.
-    Errors that would be a ValueError or a KeyError without a fleet are also one here:
+    An error that is a ValueError or a KeyError without a fleet is one with a fleet, too:
     :class:`RefusedArgument`, :class:`NotFound`.
     """
 

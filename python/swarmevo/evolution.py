@@ -111,7 +111,7 @@ class Evolution:
         """Compares the candidates for the champion on held-out trials, and makes the winner the champion.
         Candidates are the best individual since the last comparison, the mean of the distribution and the
         champion so far.
-        :func:`evolve` does so every ``champion_every`` generations.
+        :func:`evolve` compares every ``champion_every`` generations.
 
         ``evaluate``: as for :func:`evolve`, such as :attr:`Experiment.fitness`. ``trials``: number per block;
         the experiment's ``champion_trials`` if absent, 50 without an experiment. Returns the champion.
@@ -221,7 +221,7 @@ class Judgement(NamedTuple):
     blocks: list[Floats]
     """Fitness of the blocks of a comparison that only the end caused."""
     fitness: Floats
-    """``[1, T]``: of the champion."""
+    """``[1, T]``: fitness of the champion in its judgement."""
 
 
 def compute(evaluate: Evaluate, genotypes: Floats, trial_set: TrialSet, n_trials: int) -> Floats:
@@ -283,7 +283,7 @@ class Parameter:
 
     key: str
     domain: str
-    """As in "must be ..."."""
+    """The valid values, as in "must be ..."."""
     default: str
     """A value, or the formula by which the algorithm computes it."""
     meaning: str

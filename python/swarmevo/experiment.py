@@ -35,9 +35,9 @@ class Measured:
     """Fitness, and the measures of every step."""
 
     fitness: Floats
-    """``[P, T]``: of each genotype in each trial."""
+    """``[P, T]``: fitness of each genotype in each trial."""
     measures: dict[str, Floats]
-    """By name, ``[P, T, steps]``; NaN for steps without a value. ``docs/evaluation.md`` of the
+    """Measures by name, ``[P, T, steps]``; NaN for steps without a value. ``docs/evaluation.md`` of the
     project lists their units."""
 
     __repr__ = short
@@ -57,7 +57,7 @@ class Experiment:
     """
 
     def __init__(self, text: str, name: str = "", seed: int | None = None) -> None:
-        """Reads an experiment file's text. ``name`` names it if the text does not; ``seed``
+        """Reads an experiment file's text. ``name``: the name if the text has none; ``seed``
         replaces its seed. Raises :class:`ExperimentError` with all mistakes."""
         arguments.name_of(text, "an experiment file")
         arguments.name_of(name, "name")
@@ -193,8 +193,8 @@ class Experiment:
         ``[d]`` or champion. Compares champions with the experiment: :meth:`check`.
 
         ``generation``: the generation of the trials, or a :class:`TrialSet`. ``trials``: their number,
-        or a range; the file's number if absent. ``threads``: their number, that of the processors if
-        absent; they do not hold the interpreter's lock. Ctrl-C stops the computation.
+        or a range; the file's number if absent. ``threads``: number of threads, that of the processors if
+        absent. Threads do not hold the interpreter's lock. Ctrl-C stops the computation.
         """
         genes, is_one = self._genotypes(genotypes)
         where = address(generation, trials, self.n_trials)
@@ -264,7 +264,7 @@ class Experiment:
     ) -> Experiment:
         """A copy of the experiment, with these changes.
 
-        ``algorithm``: its class or its name in experiment files, such as ``"CMA-ES"``; it drops the
+        ``algorithm``: its class or its name in experiment files, such as ``"CMA-ES"``; a new one drops the
         parameters of the previous algorithm, and ``params`` sets those that differ from the defaults, for all
         populations. ``params`` without ``algorithm`` changes parameters of the experiment's algorithm.
         ``settings``: any other key of ``algorithm`` in the file, such as ``num_evaluations`` or
@@ -343,7 +343,7 @@ class Experiment:
         origin = champion.origin
         if origin is None:
             raise OtherExperimentError(
-                "the champion does not say in which experiment it evolved", "Give its `genotype` if it is of this one"
+                "the champion does not say in which experiment it evolved", "Give its `genotype` if it evolved in this one"
             )
         if origin.config_digest == self.config_digest:
             return
@@ -358,7 +358,7 @@ class Experiment:
         if origin.simulation not in (None, _core.FINGERPRINT):
             return (
                 f"It evolved by the simulation `{origin.simulation}`, but this is `{_core.FINGERPRINT}`; "
-                f"give its `genotype` to use it with this one"
+                f"give its `genotype` to use it with this simulation"
             )
         if origin.seed is not None and origin.seed != self.seed and self.replace(seed=origin.seed).config_digest == origin.config_digest:
             return f"Only the seed differs: read this experiment with seed={origin.seed}"

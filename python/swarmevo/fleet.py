@@ -95,7 +95,7 @@ class Client(Records):
             )
         self._metadata = [("authorization", f"Bearer {token}")] if token else []
         options: list[tuple[str, Any]] = [
-            # Only pings tell a patient coordinator from a dead one.
+            # While a coordinator sends nothing, only pings show whether it is alive.
             ("grpc.keepalive_time_ms", 20_000),
             ("grpc.max_reconnect_backoff_ms", 2000),
             ("grpc.max_receive_message_length", 64 << 20),
@@ -192,7 +192,7 @@ class Client(Records):
     ) -> Floats:
         """Fitness ``[P, T]`` of genotypes ``[P, d]`` (or ``[d]``: then ``[T]``), computed by the fleet: the
         bits of :meth:`Experiment.evaluate`, with the audits and repetitions of a generation. Without workers
-        it waits, and issues a :class:`FleetWarning` after two seconds.
+        the call waits, and issues a :class:`FleetWarning` after two seconds.
 
         ``generation``: the generation of the trials, or a trial set other than that of evaluations.
         ``trials``: their number; the file's if absent. ``priority``: share of the fleet, 1 to 1000.

@@ -42,7 +42,7 @@ class LocalRun:
     evolution: Evolution
     """The evolution after the last generation, from which a run can continue."""
     id: int | None = None
-    """Its number in the data directory, if it has one."""
+    """Number of the run in the data directory, if there is one."""
 
     def history(self) -> pandas.DataFrame:
         """A row per generation: best, mean, min, standard deviation, digest, times."""
@@ -101,12 +101,12 @@ def evolve(
 
     Warnings of the experiment, and a coordinator's notices that evolution learns nothing, are an
     ``EvolutionWarning``. Where a coordinator's run fails for that reason, this one raises an
-    ``EvolutionError``, a ValueError, with the same message; ``data_dir`` keeps the earlier generations. Its
-    database also stores the failure, and the same call then starts another run, like ``swarmctl run``; a file
-    of ``evaluate`` stores it with the generations, and the same call raises it again at once.
+    ``EvolutionError``, a ValueError, with the same message; ``data_dir`` keeps the earlier generations, and
+    stores the failure. After a failure in a database, the same call starts another run, like ``swarmctl run``;
+    after a failure in a file of ``evaluate``, the same call raises the error again at once.
 
-    Ctrl-C raises :class:`Interrupted`, a KeyboardInterrupt whose ``run`` has all complete generations; within
-    a second if the experiment itself computes fitness.
+    Ctrl-C raises :class:`Interrupted`, a KeyboardInterrupt whose ``run`` has all complete generations. If the
+    experiment itself computes fitness, this takes at most a second.
 
     ``evaluate``: computes fitness instead of the experiment's own :meth:`~Experiment.evaluate`:
     ``f(genotypes, trial_set, n_trials)`` returns an array ``[P, T]`` of T = ``n_trials``, of any type of numbers

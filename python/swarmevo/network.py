@@ -40,7 +40,7 @@ class Network:
         self.parameters: dict[str, NDArray[np.float64]] = {
             name: np.array([neuron[name] for neuron in neurons]) for name in names
         }
-        """By name, such as ``tau``, ``bias`` and ``gain`` of ``ctrnn``: ``[N]``."""
+        """Parameters of the neurons by name, such as ``tau``, ``bias`` and ``gain`` of ``ctrnn``: ``[N]``."""
         self.input_weights: NDArray[np.float64] = np.zeros((len(neurons), len(self.inputs)))
         """``[N, I]``: weight of each synapse from an input, 0 without a synapse."""
         self.weights: NDArray[np.float64] = np.zeros((len(neurons), len(neurons)))

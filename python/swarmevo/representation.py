@@ -11,7 +11,7 @@ LENGTH_MAX = 200
 
 
 def short(self: Any) -> str:
-    """Its class and attributes, with the shape of arrays and the length of long lists."""
+    """The class and attributes of an object, with the shape of arrays and the length of long lists."""
     parts = [f"{name}={_short(value)}" for name, value in vars(self).items() if not name.startswith("_")]
     text = ", ".join(parts)
     return f"<{type(self).__name__}: {text if len(text) <= LENGTH_MAX else text[: LENGTH_MAX - 3] + '...'}>"

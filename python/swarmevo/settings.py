@@ -32,7 +32,7 @@ class Settings:
     tls_key: str | None = None
     """PEM file of its key."""
     tls_domain: str | None = None
-    """Name in the coordinator's certificate, if it is not the address's."""
+    """Name in the coordinator's certificate, if it differs from the name in the address."""
     plaintext: bool = False
     """Send the token unencrypted to another machine."""
 

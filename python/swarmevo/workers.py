@@ -64,12 +64,12 @@ def workers(
     workers end soon after this process does. If a node is lost, its worker is started again, and
     other workers compute its items.
 
-    An executor of processes must spawn them: a forked process has copies of this one's
-    connections, and disturbs them. ``ProcessPoolExecutor(4, mp_context=get_context("spawn"))``.
+    An executor of processes must spawn its processes: a forked process would share the
+    connections of this process, and disturb them. ``ProcessPoolExecutor(4, mp_context=get_context("spawn"))``.
 
-    ``coordinator``: its address, which the workers' nodes must reach. It and the other settings
-    default as in :func:`connect`, except for the token, which is the workers': this process reads
-    it from ``SWARM_WORKER_TOKEN`` or the file that ``SWARM_WORKER_TOKEN_FILE`` names. Workers read
+    ``coordinator``: its address, which the workers' nodes must reach. All settings
+    but the token have the defaults of :func:`connect`. The token is that of workers: this process
+    reads it from ``SWARM_WORKER_TOKEN`` or the file that ``SWARM_WORKER_TOKEN_FILE`` names. Workers read
     TLS files on their own nodes.
     """
     n = arguments.whole(n, "n, the number of workers,", 1, WORKERS_MAX)
@@ -151,7 +151,7 @@ class Workers:
 
     def stop(self, wait: bool = True) -> None:
         """Tells all workers to finish their items and to leave: in this process at once, in others
-        at the end of their turns. ``wait``: until they have left."""
+        at the end of their turns. ``wait``: whether to wait until they have left."""
         self._stopped.set()
         if wait:
             self._keeper.join()
@@ -200,7 +200,7 @@ class _OfExecutor:
     def __init__(self, executor: Submits) -> None:
         if _forks(executor):
             raise ValueError(
-                "this executor forks its processes, which would share the connections of this one; "
+                "this executor forks its processes, which would share the connections of this process; "
                 'give it mp_context=multiprocessing.get_context("spawn")'
             )
         self._executor = executor

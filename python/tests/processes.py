@@ -23,7 +23,7 @@ class Fleet:
         self.url = self.start_coordinator()
 
     def start_coordinator(self) -> str:
-        """Starts it, the second time on the same port."""
+        """Starts the coordinator. A restarted one gets the same port."""
         log = self.directory / f"coordinator-{len(self.processes)}.log"
         args = ["coordinator", "--listen", self.listen, "--data-dir", self.directory / "data",
                 *self.args]

@@ -16,8 +16,7 @@ T, STEPS, R = 30, 60, 8
 
 
 def planted(symbols, sends=None, heard=None):
-    """The trace, reduced to what the measures read, of a swarm that sends `symbols` [T, STEPS,
-    R]."""
+    """The parts of a trace that the measures read, of a swarm that sends `symbols` [T, STEPS, R]."""
     shape = symbols.shape
     heard = np.full(shape, -1) if heard is None else heard
     return SimpleNamespace(
@@ -41,7 +40,7 @@ def binary_entropy(p):
 
 
 @pytest.mark.parametrize("p", [0.0, 0.3, 0.8])
-def test_a_symbol_that_copies_a_stimulus_tells_as_much_as_it_can(rng, p):
+def test_a_symbol_that_copies_a_stimulus_has_the_expected_information(rng, p):
     stimulus = rng.integers(0, 2, (T, STEPS, R))
     copies = rng.random(stimulus.shape) < p
     said = np.where(copies, stimulus, rng.integers(0, 2, stimulus.shape))
@@ -52,14 +51,14 @@ def test_a_symbol_that_copies_a_stimulus_tells_as_much_as_it_can(rng, p):
     assert (found.p < 0.01) == (p > 0)
 
 
-def test_what_a_relaying_robot_would_say_tells_nothing(rng):
+def test_unsent_messages_of_relays_do_not_count(rng):
     stimulus = rng.integers(0, 2, (T, STEPS, R))
     sends = rng.random(stimulus.shape) < 0.5
     said = np.where(sends, stimulus, 1 - stimulus)
     assert analysis.signalling(planted(said, sends), stimulus).bits == pytest.approx(1, abs=0.01)
 
 
-def test_a_channel_that_nobody_listens_to_has_no_listeners(rng):
+def test_a_channel_without_listeners_has_no_positive_listening(rng):
     heard = rng.integers(-1, 2, (T, STEPS, R))
     trace = planted(rng.integers(0, 2, (T, STEPS, R)), heard=heard)
     deaf = analysis.listening(trace, rng.integers(0, 2, (T, STEPS, R)))
@@ -68,7 +67,7 @@ def test_a_channel_that_nobody_listens_to_has_no_listeners(rng):
     assert obedient.bits == pytest.approx(1, abs=0.01) and obedient.p < 0.01
 
 
-def test_what_changes_slowly_depends_on_nothing_else_that_does(rng):
+def test_slow_variables_do_not_seem_to_depend_on_each_other(rng):
     # One value per trial and robot: shuffled rows would find hundreds of independent agreements.
     slow = np.repeat(rng.integers(0, 2, (T, 1, 1)), STEPS, axis=1).repeat(R, axis=2)
     other = np.repeat(rng.integers(0, 2, (T, 1, 1)), STEPS, axis=1).repeat(R, axis=2)
@@ -85,14 +84,14 @@ def test_entropy_and_information_of_known_tables():
     assert len(set(codes.tolist())) == 3
 
 
-def test_a_robot_that_does_what_it_said_two_steps_ago_is_consistent_at_that_lag(rng):
+def test_a_robot_that_acts_on_its_message_two_steps_later_is_consistent_at_that_lag(rng):
     said = rng.integers(0, 2, (T, STEPS, R))
     found = analysis.speaker_consistency(planted(said), np.roll(said, 2, axis=1), range(4))
     assert found[2] == pytest.approx(1)
     assert all(found[lag] < 0.01 for lag in (0, 1, 3))
 
 
-def test_bins_hold_equally_many_and_missing_values_none():
+def test_bins_hold_equal_counts_and_no_missing_values():
     assert analysis.discretise([0.1, 0.2, 0.3, 0.4, np.nan], 2).tolist() == [0, 0, 1, 1, -1]
     assert analysis.discretise([0.0, 1.0, 1.0], 4).tolist() == [0, 1, 1]
 
@@ -139,7 +138,7 @@ def test_beers_oscillator_goes_round_and_a_held_input_stops_it():
     assert isinstance(rest, Equilibrium) and rest.is_stable
 
 
-def test_an_attractor_that_is_followed_changes_its_kind_where_eigenvalues_cross():
+def test_a_followed_attractor_changes_its_kind_where_eigenvalues_cross():
     network = CTRNN(**OSCILLATOR)
     inputs = [[phi, 0] for phi in np.linspace(3, 0, 7)]
     kinds = [type(it) for it in network.follow(inputs)]
@@ -155,7 +154,7 @@ def test_two_neurons_that_excite_themselves_have_every_equilibrium():
     assert sum(it.is_stable for it in found) == 4
 
 
-def test_a_genotypes_network_alone_does_what_it_did_in_the_swarm(quickstart, genotypes):
+def test_an_isolated_network_acts_as_in_the_swarm(quickstart, genotypes):
     trace = quickstart.simulate(genotypes[0], 1)
     network = CTRNN.of(quickstart.network(genotypes[0]))
     topology = quickstart.to_dict()["topology"]
@@ -180,7 +179,7 @@ def test_a_report_says_which_inputs_matter_and_is_the_same_file_twice(quickstart
     assert [row["input that is 0"] for row in rows][0] == "none" and len(rows) > 3
 
 
-def test_an_input_that_is_absent_already_changes_not_a_bit(tmp_path):
+def test_removing_an_absent_input_changes_no_bit(tmp_path):
     config = json.loads((PROJECT / "configs/leader_selection_snes.json").read_text())
     champion = json.loads((PROJECT / "results/champions/leader_selection_snes-0.json").read_text())
     config["algorithm"]["evaluation_steps"] = 60

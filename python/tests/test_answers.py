@@ -51,10 +51,10 @@ def test_reports_say_where_networks_settle():
 class TestLeaderSelection:
     """A: a robot that hears nothing leads."""
 
-    def test_who_has_heard_nothing_for_ten_steps_has_its_led_on_and_who_has_heard_something_in_each_has_not(self):
+    def test_robots_that_heard_nothing_for_ten_steps_are_on_and_those_that_heard_in_each_are_off(self):
         trace = episodes("leader_selection")
         lit, heard = trace.leds > 0, within(trace.frame_emitters >= 0, 10)
-        # Robots that have failed hear, and must not lead: those that have led alone for 50 steps.
+        # Robots that have led alone for 50 steps have failed: they hear, but must not lead.
         alone = lit & (lit.sum(axis=2, keepdims=True) == 1)
         failed = np.cumsum(within(alone, 50) >= 50, axis=1) > 0
         sound = ~np.roll(failed, 1, axis=1)
@@ -150,7 +150,7 @@ class TestOrientationConsensus:
 class TestLightFollower:
     """D: turn to heard robots, stop for those behind, circle the light."""
 
-    def test_in_the_dark_it_drives_to_what_it_hears_in_front_turns_to_the_sides_and_stops_for_what_is_behind(self):
+    def test_in_the_dark_robots_drive_to_senders_in_front_turn_to_those_beside_and_stop_for_those_behind(self):
         trace = episodes("light_follower")
         dark = light_sectors(trace).max(axis=-1) == 0
         dark[:, :FIRST] = False
@@ -160,7 +160,7 @@ class TestLightFollower:
         assert (behind < 0.1).all()
         assert right[0] < 0.1 and right[1] > 0.9
 
-    def test_who_sees_the_light_has_it_on_its_right_or_behind_and_turns_right(self):
+    def test_robots_that_see_the_light_have_it_on_their_right_or_behind_and_turn_right(self):
         trace = episodes("light_follower")
         light = light_sectors(trace)
         seen = light.max(axis=-1) > 0

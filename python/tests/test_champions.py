@@ -56,7 +56,7 @@ CALLS = {
 
 
 @pytest.mark.parametrize("call", CALLS)
-def test_a_champion_is_taken_where_it_was_evolved_and_refused_elsewhere(call, tiny, champion, others):
+def test_a_champion_is_accepted_by_its_experiment_and_refused_by_others(call, tiny, champion, others):
     CALLS[call](tiny, champion)
     for other in others:
         with pytest.raises(REFUSED, match="evolved in another experiment: quickstart, seed 1"):
@@ -78,7 +78,7 @@ def test_every_function_that_takes_a_genotype_is_tried_here():
     assert takes - CALLS.keys() == {"report"}, "a report is tried by its command"
 
 
-def test_names_generations_and_judgement_are_no_other_experiment(tiny, champion):
+def test_names_generations_and_judgement_make_no_other_experiment(tiny, champion):
     config = tiny.to_dict()
     config["name"] = "of another name"
     config["algorithm"].update(generations=9, judgement_trials=5)
@@ -87,12 +87,12 @@ def test_names_generations_and_judgement_are_no_other_experiment(tiny, champion)
     other.check(champion)
 
 
-def test_only_another_seed_is_said_to_be_one(tiny, champion):
+def test_a_difference_in_the_seed_alone_is_named(tiny, champion):
     with pytest.raises(REFUSED, match="Only the seed differs: read this experiment with seed=1"):
         tiny.replace(seed=7).check(champion)
 
 
-def test_a_champion_file_says_what_it_was_evolved_in():
+def test_a_champion_file_names_its_experiment():
     champion = swarmevo.Champion.from_file(FILE)
     assert champion.origin.config_digest == json.loads(FILE.read_text())["config_digest"]
     assert isinstance(champion.judged, swarmevo.Judged) and champion.judged.low < champion.judged.mean < champion.judged.high
@@ -102,7 +102,7 @@ def test_a_champion_file_says_what_it_was_evolved_in():
         swarmevo.Experiment.from_file(PROJECT / "configs/leader_selection_ga.json", champion.origin.seed).check(champion)
 
 
-def test_one_of_an_older_simulation_is_told_so(tmp_path):
+def test_a_champion_of_an_older_simulation_is_recognised(tmp_path):
     file = tmp_path / "older.json"
     file.write_text(FILE.read_text().replace("sim-core 0.1.0 format 3", "sim-core 0.1.0 format 2"))
     champion = swarmevo.Champion.from_file(file)

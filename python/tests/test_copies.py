@@ -68,7 +68,7 @@ def in_process(start, call, *arguments):
 
 @pytest.mark.parametrize("n_steps", [0, 1, 12])
 @pytest.mark.parametrize("way", WAYS)
-def test_a_copy_of_episodes_goes_on_to_the_same_bits_and_leaves_the_original(quickstart, way, n_steps):
+def test_a_copy_of_episodes_continues_to_the_same_bits_and_leaves_the_original(quickstart, way, n_steps):
     episodes = begun(quickstart, n_steps)
     once = WAYS[way](episodes)
     again = WAYS[way](once)
@@ -78,12 +78,12 @@ def test_a_copy_of_episodes_goes_on_to_the_same_bits_and_leaves_the_original(qui
 
 
 @pytest.mark.parametrize("start", STARTS)
-def test_episodes_go_on_in_another_process(quickstart, start):
+def test_episodes_continue_in_another_process(quickstart, start):
     episodes = begun(quickstart, 12)
     assert in_process(start, send_rest, episodes) == rest(episodes)
 
 
-def test_steps_that_the_network_has_decided_take_no_room(quickstart):
+def test_steps_that_the_network_decides_take_no_memory(quickstart):
     episodes = quickstart.episodes(trials=200)
     small = len(pickle.dumps(episodes))
     episodes.load(np.full(quickstart.n_genes, 0.5))
@@ -123,14 +123,14 @@ def world(quickstart):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_copy_of_an_environment_goes_on_to_the_same_bits(world, way):
+def test_a_copy_of_an_environment_continues_to_the_same_bits(world, way):
     other = WAYS[way](world)
     assert other.possible_agents == world.possible_agents and other.action_spaces == world.action_spaces
     assert played(other, 4) == played(world, 4)
 
 
 @pytest.mark.parametrize("start", STARTS)
-def test_an_environment_goes_on_in_another_process(world, start):
+def test_an_environment_continues_in_another_process(world, start):
     assert in_process(start, send_played, world) == played(world, 4)
 
 

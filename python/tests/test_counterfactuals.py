@@ -30,7 +30,7 @@ def inhibited(experiment, sensor):
 
 
 def course(leader, silent=False):
-    """Actions of each step, and stimuli, of one episode; all robots are silent in all steps, or none is."""
+    """Actions and stimuli of each step of one episode. Either all robots are silent in all steps, or none is."""
     experiment, genotype = leader
     episodes = experiment.episodes(swarmevo.TrialSet.evaluation(), trials=1)
     episodes.load(genotype)
@@ -48,7 +48,7 @@ def same(one, other):
     return all(np.array_equal(mine, its) for name, mine in vars(one).items() for its in [vars(other)[name]])
 
 
-def test_what_a_leader_says_moves_others_and_what_relays_would_say_does_not(leader):
+def test_messages_of_a_leader_move_others_and_unsent_messages_of_relays_do_not(leader):
     found = analysis.influence(*leader, [40, 45], trials=4)
     assert found.said.any() and not found.said.all()
     assert (found.reached[~found.said] == 0).all(), "a message that is not sent has no influence"
@@ -65,7 +65,7 @@ def test_a_message_that_nobody_senses_has_no_influence_at_all(leader, sensor):
 
 
 @pytest.mark.parametrize("reading", ["msg", "receiving_direction", "state"])
-def test_what_is_inhibited_stays_so_whatever_a_robot_is_told_to_sense(leader, reading):
+def test_inhibited_inputs_stay_inhibited(leader, reading):
     experiment, genotype = leader
     sensor = f"wireless_receiver:{reading}"
     there, away = (
@@ -76,7 +76,7 @@ def test_what_is_inhibited_stays_so_whatever_a_robot_is_told_to_sense(leader, re
     assert not any(it.any() for it in (away.sensed, away.heeded, away.reached, away.leds, away.fitness))
 
 
-def test_light_that_a_robot_cannot_see_does_nothing_to_it_and_to_the_others_it_does(follower):
+def test_replaced_readings_of_light_affect_only_robots_that_see_it(follower):
     found = analysis.attention(*follower, [20, 60], sensor="light_sensor", replace=0.7, trials=3)
     assert (found.sensed.sum(axis=-1) == 2).all(), "eight of ten are blind"
     assert found.heeded[found.sensed].any()
@@ -94,11 +94,11 @@ def test_a_message_replaced_by_itself_changes_nothing_and_a_wrong_step_is_refuse
     itself = episodes.decide().messages[0, sender]
     found = analysis.influence(experiment, genotype, [40], replace=itself, agents=[sender], trials=1)
     assert not found.said.any() and not found.reached.any()
-    with pytest.raises(ValueError, match="steps from 0 to 298"):
+    with pytest.raises(ValueError, match="steps are numbered from 0 to 298"):
         analysis.influence(experiment, genotype, [299], trials=1)
 
 
-def test_what_an_input_without_synapses_says_is_heeded_by_nobody(leader):
+def test_an_input_without_synapses_has_no_effect(leader):
     experiment, genotype = leader
     where, zero = analysis.synapse_genes(experiment)
     network = experiment.network(genotype)
@@ -112,12 +112,12 @@ def test_what_an_input_without_synapses_says_is_heeded_by_nobody(leader):
         assert not any(it.any() for it in effects) if is_deaf else found.heeded.any()
 
 
-def test_who_senses_what_it_would_have_sensed_does_what_it_did(leader):
+def test_an_unchanged_reading_changes_no_action(leader):
     found = analysis.attention(*leader, [0], replace="freeze", trials=3)
     assert not found.sensed.any() and not found.heeded.any() and not found.reached.any()
 
 
-def test_the_longer_a_robot_is_deaf_the_more_it_does_otherwise(leader):
+def test_longer_deafness_changes_more_actions(leader):
     once, always = (
         analysis.attention(*leader, [40], sensor="wireless_receiver", lasting=lasting, trials=5) for lasting in (1, 11)
     )
@@ -129,7 +129,7 @@ def test_the_longer_a_robot_is_deaf_the_more_it_does_otherwise(leader):
 def test_sensors_that_no_network_has_are_refused(leader):
     with pytest.raises(ValueError, match="no input comes from 'light_sensor'; there are wireless_receiver:msg, "):
         analysis.attention(*leader, [40], sensor="light_sensor")
-    with pytest.raises(ValueError, match="lasting from 1 to 11"):
+    with pytest.raises(ValueError, match="lasting is from 1 to 11"):
         analysis.attention(*leader, [40], lasting=12)
     with pytest.raises(ValueError, match="agents are numbered from 0 to 9, not 10, -1"):
         analysis.attention(*leader, [40], agents=[3, 10, -1])
@@ -149,7 +149,7 @@ def test_stimuli_that_do_not_fit_are_refused_and_those_that_are_set_are_sensed(q
     assert (episodes.stimuli == 0.25).all()
 
 
-def test_frozen_is_what_it_was_in_the_step_before_and_permuted_is_what_the_next_robot_has(leader):
+def test_frozen_values_are_those_of_the_previous_step_and_permuted_ones_those_of_the_next_robot(leader):
     actions, stimuli = course(leader)
     episode = {"agents": [3], "trials": 1, "lasting": 1}
     # A step in which robot 3 sends, and the messages and readings of robots 3 and 4 differ from
@@ -168,14 +168,14 @@ def test_frozen_is_what_it_was_in_the_step_before_and_permuted_is_what_the_next_
         assert heard[0].sensed.all() and same(*heard), mode
 
 
-def test_the_longer_a_robot_says_something_else_the_more_others_do_otherwise(leader):
+def test_longer_replacements_of_messages_change_more_actions_of_others(leader):
     once, always = (analysis.influence(*leader, [5], replace=0.0, lasting=lasting, trials=5) for lasting in (1, 11))
     assert (once.said <= always.said).all() and once.said.any()
     assert not once.reached[~once.said].any() and not always.reached[~always.said].any()
     assert always.reached.sum() > once.reached.sum() and always.leds.sum() > once.leds.sum()
 
 
-def test_a_silent_swarm_does_what_robots_out_of_reach_do(leader):
+def test_a_silent_swarm_acts_like_robots_out_of_reach(leader):
     experiment, genotype = leader
     config = experiment.to_dict()
     config["world"]["objects"]["robotA"]["initializers"]["positions"] = {
@@ -187,24 +187,24 @@ def test_a_silent_swarm_does_what_robots_out_of_reach_do(leader):
     assert all(np.array_equal(mine.messages, its.messages) for mine, its in zip(silent, apart))
 
 
-def test_silence_is_something_else_than_a_message_of_zeros(leader):
+def test_silence_differs_from_a_message_of_zeros(leader):
     zeros, silence = (analysis.influence(*leader, [40, 45], replace=it, trials=4) for it in (0.0, "silence"))
     assert silence.said.all(), "also a frame that is relayed is missing"
     assert silence.reached[~zeros.said].any()
     assert (silence.reached != zeros.reached)[zeros.said].any()
 
 
-def test_a_whole_robot_is_silenced_in_one_call(leader):
+def test_one_call_silences_a_whole_robot(leader):
     experiment, genotype = leader
     found = analysis.influence(experiment, genotype, [0], replace="silence", lasting=300, window=299, trials=2)
     once = analysis.influence(experiment, genotype, [0], replace="silence", window=299, trials=2)
     assert (found.reached > 0).all() and found.leds.sum() > once.leds.sum()
 
 
-def test_silence_is_nothing_to_sense_and_has_to_fit(leader, quickstart):
+def test_silence_is_no_reading_and_needs_the_right_shape(leader, quickstart):
     with pytest.raises(ValueError, match='"permute" or, of messages, "silence", not \'silence\''):
         analysis.attention(*leader, [40], replace="silence", trials=1)
-    with pytest.raises(ValueError, match="lasting from 1 to 11"):
+    with pytest.raises(ValueError, match="lasting is from 1 to 11"):
         analysis.influence(*leader, [40], lasting=0)
     with pytest.raises(ValueError, match="who is silent: an array"):
         quickstart.episodes().silence([True])

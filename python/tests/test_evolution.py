@@ -18,7 +18,7 @@ def sphere(genotypes):
 
 
 @pytest.mark.parametrize("algorithm", ALL, ids=lambda it: it.__name__)
-def test_every_algorithm_improves_and_goes_on_from_its_state_to_the_same_bits(algorithm):
+def test_every_algorithm_improves_and_continues_from_its_state_to_the_same_bits(algorithm):
     evolution = algorithm(5, population_size=20, seed=3)
     first = evolution.tell(sphere(evolution.ask()))
     for _ in range(40):
@@ -45,7 +45,7 @@ def test_asking_twice_gives_the_same_and_trials_count_by_their_mean():
     assert np.array_equal(one.ask(), other.ask())
 
 
-def test_a_setup_is_refused_with_everything_that_is_wrong():
+def test_a_setup_is_refused_with_all_its_mistakes():
     with pytest.raises(ValueError) as refused:
         swarmevo.CMAES(1001, population_size=1, sigma_init=2.0, eta_mu=1)
     assert len(str(refused.value).splitlines()) == 4
@@ -95,7 +95,7 @@ def test_a_run_here_is_the_run_of_swarmctl(quickstart, programs, tmp_path):
     assert run.champion.judged is not None and run.champion.judged[3] == 200
 
 
-def test_a_run_goes_on_where_a_shorter_one_has_ended(quickstart):
+def test_a_run_continues_where_a_shorter_one_has_ended(quickstart):
     config = quickstart.to_dict()
     config["algorithm"].update(champion_every=2, judgement_trials=2)
     experiment = swarmevo.Experiment.from_dict(config)

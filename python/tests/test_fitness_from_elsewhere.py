@@ -73,7 +73,7 @@ def test_torch_tensors_are_fitness(short):
     assert run.digest == expected.digest
 
 
-def test_a_function_without_noise_may_give_one_number_each_and_is_judged_on_one(short):
+def test_a_function_without_noise_may_return_one_number_per_genotype(short):
     run = swarmevo.evolve(short, evaluate=lambda genotypes, *_: genotypes.sum(axis=1).astype("f4"), progress=False)
     assert run.champion.judged.n_trials == run.champion.selection.n_trials == 1
     assert run.champion.judged.mean == np.float32(run.champion.genotype.sum())
@@ -100,7 +100,7 @@ WRONG = {
 
 @pytest.mark.parametrize("wrong", WRONG)
 @pytest.mark.parametrize("kind", ["generation", "held_out", "judgement"])
-def test_what_does_not_fit_is_refused_at_once_whenever_it_comes(short, wrong, kind):
+def test_fitness_of_a_wrong_shape_is_refused_at_once_in_any_call(short, wrong, kind):
     asked = []
 
     def evaluate(genotypes, trial_set, n_trials):
@@ -117,7 +117,7 @@ def test_what_does_not_fit_is_refused_at_once_whenever_it_comes(short, wrong, ki
         assert "real numbers" in str(refused.value)
 
 
-def test_what_the_function_raises_comes_out_unchanged(short):
+def test_exceptions_of_the_function_pass_unchanged(short):
     class Mine(Exception):
         pass
 
@@ -152,7 +152,7 @@ def test_fitness_that_is_not_finite_ranks_last_and_is_no_judgement(short, value)
     assert never.champion.judged is None and never.champion.selection is None
 
 
-def test_a_loop_of_ones_own_ends_with_the_champion_of_evolve(short):
+def test_a_loop_of_the_caller_ends_with_the_champion_of_evolve(short):
     expected = swarmevo.evolve(short, progress=False)
     evolution = short.evolution()
     for generation in range(3):
@@ -166,7 +166,7 @@ def test_a_loop_of_ones_own_ends_with_the_champion_of_evolve(short):
     assert evolution.judge(short.fitness, trials=3).judged.n_trials == 3
 
 
-def test_nobody_is_compared_or_judged_before_the_first_generation(short):
+def test_no_champion_is_compared_or_judged_before_the_first_generation(short):
     for evolution in (short.evolution(), swarmevo.SNES(3)):
         for method in (evolution.compare, evolution.judge):
             with pytest.raises(ValueError, match="before the first"):
@@ -186,8 +186,8 @@ def hostile():
 
 
 def test_no_call_of_the_extension_panics(quickstart):
-    """Each class and function, with everything in each place: exceptions, but never a PanicException, which
-    is none of Exception's."""
+    """Calls every class and function with all kinds of values in each place. A call may raise an exception, but
+    not a PanicException, which does not derive from Exception."""
     evolution = swarmevo.SNES(4)
     evolution.tell(np.zeros(20))
     compared = evolution._core.reevaluation()

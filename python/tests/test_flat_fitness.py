@@ -24,8 +24,8 @@ def every_warning_counts():
 
 @pytest.fixture(scope="module")
 def still():
-    """Its script gives all individuals the same fitness, and chance soon drives its distribution out of all
-    bounds."""
+    """An experiment whose script gives all individuals the same fitness: chance soon drives the distribution
+    out of all bounds."""
     config = swarmevo.Experiment.from_file(CONFIGS / "tasks" / "scent.json").to_dict()
     config["task"]["script"] = {"name": "still.star", "text": "def sense(robot):\n    return [0.5, 0.5]\n\ndef fitness(world):\n    return 0.25\n"}
     config["topology"]["ensembles"]["H"]["n"] = 1
@@ -58,7 +58,7 @@ def test_fitness_that_is_not_finite_warns():
         evolution.tell([1, 2, 3, np.nan])
 
 
-def test_a_distribution_out_of_all_bounds_ends_tell_which_leaves_evolution_as_it_was():
+def test_tell_refuses_a_distribution_out_of_all_bounds_and_leaves_evolution_unchanged():
     evolution = swarmevo.XNES(6, population_size=6)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -88,7 +88,7 @@ def test_populations_that_teach_nothing_warn(quickstart, size, words):
     swarmevo.SNES(3, population_size=4)
 
 
-def test_evolve_says_what_a_coordinator_has_as_notices(still, tmp_path):
+def test_evolve_warns_with_the_notices_of_a_coordinator(still, tmp_path):
     for name, evaluate in (("", None), ("database", None), ("file", flat)):
         with pytest.warns(swarmevo.EvolutionWarning) as caught:
             swarmevo.evolve(still, evaluate=evaluate, progress=False, data_dir=tmp_path / name if name else None)
@@ -101,7 +101,7 @@ def test_evolve_says_what_a_coordinator_has_as_notices(still, tmp_path):
 
 
 @pytest.mark.parametrize("evaluate", [None, flat])
-def test_a_run_that_goes_on_counts_the_generations_before_it_was_interrupted(still, tmp_path, evaluate):
+def test_a_continued_run_counts_the_generations_before_the_interrupt(still, tmp_path, evaluate):
     def stop(generation, evolution):
         if generation.index == 6:
             raise KeyboardInterrupt
@@ -118,7 +118,7 @@ def test_a_run_that_goes_on_counts_the_generations_before_it_was_interrupted(sti
             copied.tell([0.25] * 6)
 
 
-def test_a_failed_run_in_a_file_stays_failed_and_one_without_generations_begins_anew(still, tmp_path):
+def test_a_failed_run_in_a_file_stays_failed_and_one_without_generations_starts_again(still, tmp_path):
     warnings.simplefilter("ignore")
     long, asked = still.replace(generations=20_000), []
 
@@ -138,7 +138,7 @@ def test_a_failed_run_in_a_file_stays_failed_and_one_without_generations_begins_
     assert not file.exists()
 
 
-def test_evolve_fails_where_swarmctl_run_does_and_with_the_same_words(still, programs, tmp_path):
+def test_evolve_fails_like_swarmctl_run_with_the_same_words(still, programs, tmp_path):
     long = still.replace(generations=20_000)
     file = tmp_path / "still.json"
     file.write_text(long.to_json())

@@ -106,7 +106,7 @@ ASKING = {
 
 
 @pytest.mark.parametrize("ask", ASKING)
-def test_waiting_for_workers_that_are_not_there_is_a_warning(programs, tmp_path, short, genotypes, ask):
+def test_waiting_for_missing_workers_is_a_warning(programs, tmp_path, short, genotypes, ask):
     seen = []
     with fleet(programs, tmp_path) as started, started.connect() as client, warnings.catch_warnings():
 
@@ -281,7 +281,7 @@ def test_tls_is_spoken_by_client_and_workers(programs, tmp_path, quickstart, gen
             stranger.experiments()
 
 
-def test_a_coordinator_that_is_not_there_is_an_error():
+def test_a_missing_coordinator_is_an_error():
     with swarmevo.connect("http://127.0.0.1:9", patience=0) as client:
         with pytest.raises(FleetError) as refused:
             client.experiments()

@@ -59,7 +59,7 @@ def test_a_world_that_grows_with_its_swarm_keeps_its_density_and_one_that_does_n
     assert neighbours(crowded) > 3 * ten
 
 
-def test_density_changes_alone_where_the_file_says_how_dense_robots_start():
+def test_density_changes_alone_if_the_file_sets_the_starting_density():
     what = "density of as many robots, times"
     found = conditions("light_follower_snes", what)
     assert {it.n_robots for it in found.values()} == {10}

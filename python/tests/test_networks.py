@@ -21,7 +21,7 @@ def test_beers_circuit_has_a_hopf_point_where_the_trace_of_its_jacobian_is_zero(
         assert np.trace(jacobian) == pytest.approx(0, abs=1e-8)
         assert np.linalg.det(jacobian) > 0
         assert it.period == pytest.approx(2 * np.pi / np.sqrt(np.linalg.det(jacobian)), rel=1e-6)
-        # On one side of it the state comes to rest, on the other it cycles with about that period.
+        # On one side of the Hopf point the state comes to rest. On the other it cycles with about that period.
         at = -3 + 6 * it.share
         inwards = 0.02 * np.sign(-at)
         rest = OSCILLATOR.attractor([at - 5 * inwards, 0])
@@ -30,7 +30,7 @@ def test_beers_circuit_has_a_hopf_point_where_the_trace_of_its_jacobian_is_zero(
         assert cycle.period == pytest.approx(it.period, rel=0.2)
 
 
-def test_a_branch_agrees_with_equilibria_that_are_searched_for_anew():
+def test_a_branch_agrees_with_equilibria_of_a_new_search():
     (branch,) = analysis.continuation(OSCILLATOR, [-3, 0], [3, 0])
     for share in (0.0, 0.31, 0.5, 0.77, 1.0):
         searched = OSCILLATOR.equilibria([-3 + 6 * share, 0])
@@ -111,7 +111,7 @@ def test_the_ways_of_figure_2_3_move_a_point_and_turn_one_into_a_cycle():
     assert not branch.stable[branch.shares > hopf.share + 1e-6].any()
 
 
-def test_every_synapse_has_the_gene_that_the_network_says(quickstart, genotypes):
+def test_every_synapse_has_the_gene_that_encodes_its_weight(quickstart, genotypes):
     where, zero = analysis.synapse_genes(quickstart)
     synapses = quickstart.network(genotypes[0]).description["synapses"]
     assert len(where) == len(synapses) == len(set(where.tolist())), "a gene each"
@@ -124,7 +124,7 @@ def test_every_synapse_has_the_gene_that_the_network_says(quickstart, genotypes)
         assert after[:synapse] + after[synapse + 1 :] == before[:synapse] + before[synapse + 1 :]
 
 
-def test_lesions_are_ranked_by_what_they_cost_and_those_without_effect_say_so(quickstart, genotypes):
+def test_lesions_are_ranked_by_their_cost_and_those_without_effect_say_so(quickstart, genotypes):
     found = analysis.ablation(quickstart, genotypes[0], "neurons", trials=4)
     network = quickstart.network(genotypes[0])
     changes = [it.change for it in found]
@@ -141,7 +141,7 @@ def test_lesions_are_ranked_by_what_they_cost_and_those_without_effect_say_so(qu
     assert again[network.neurons[3]].is_same and again[network.neurons[3]].change == 0
 
 
-def test_without_an_input_it_is_as_if_its_sensor_were_silent(quickstart, genotypes):
+def test_removing_an_input_equals_silencing_its_sensor(quickstart, genotypes):
     stimuli = quickstart.to_dict()["topology"]["stimuli"]
     name = next(name for name, it in stimuli.items() if it["sensor"] == "wireless_receiver:state")
     lesions = {it.part: it for it in analysis.ablation(quickstart, genotypes[0], "inputs", trials=4)}

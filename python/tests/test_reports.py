@@ -49,7 +49,7 @@ def short(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def reported(short, tmp_path_factory):
-    """The report on it, computed here."""
+    """The report on champion A, computed in this process."""
     directory = tmp_path_factory.mktemp("here")
     made = command(short[0], "--config", short[1], "--changed-conditions", "--trials", 2, "-o", directory)
     assert made.returncode == 0, made.stderr
@@ -65,7 +65,7 @@ def test_one_command_reports_on_a_champion_file(short, reported, tmp_path):
     assert {"report.html", "answer.txt", "inputs.csv", "conditions.csv", "lesions-neurons.csv"} <= files(tmp_path).keys()
 
 
-def test_what_cannot_be_reported_on_is_one_line(short, tmp_path):
+def test_every_refusal_is_one_line(short, tmp_path):
     champion, config = short
     (tmp_path / "half.json").write_text('{"genotype": [0.5]}')
     without = command(champion, "-o", tmp_path)
@@ -100,7 +100,7 @@ def test_one_command_reports_on_an_individual_of_a_data_directory(programs, quic
     assert files(tmp_path / "report") == files(tmp_path / "again")
 
 
-def test_conditions_and_lesions_of_a_fleet_are_those_computed_here(programs, short, reported, tmp_path):
+def test_conditions_and_lesions_are_the_same_on_a_fleet(programs, short, reported, tmp_path):
     pytest.importorskip("grpc")
     champion, config = short
     with fleet(programs, tmp_path) as running:

@@ -66,7 +66,7 @@ def test_a_run_that_is_kept_has_the_same_bits_and_is_not_computed_again(short, w
 
 
 @pytest.mark.parametrize("n", range(1, GENERATIONS + 1))
-def test_an_interrupted_run_goes_on_by_the_same_call_to_the_same_bits(short, whole, tmp_path, n):
+def test_the_same_call_continues_an_interrupted_run_to_the_same_bits(short, whole, tmp_path, n):
     with pytest.raises(swarmevo.Interrupted) as stopped:
         swarmevo.evolve(short, progress=False, data_dir=tmp_path, callback=stop_after(n))
     assert stopped.value.run.generations == whole.generations[:n] and stopped.value.run.evolution.n_generations == n
@@ -106,7 +106,7 @@ def test_an_interrupt_within_a_comparison_leaves_whole_generations(short, whole)
     assert type(nothing.value) is KeyboardInterrupt
 
 
-def test_what_a_callback_raises_comes_out_unchanged_and_the_generation_is_kept(short, whole, tmp_path):
+def test_exceptions_of_a_callback_pass_unchanged_and_the_generation_is_kept(short, whole, tmp_path):
     def callback(generation, _):
         if generation.index == 2:
             raise OSError("the disk of my log is full")
@@ -124,7 +124,7 @@ def test_a_callback_cannot_change_the_run(short, whole):
     same(swarmevo.evolve(short, progress=False, callback=callback), whole)
 
 
-def test_more_generations_go_on_from_fewer(short, whole, tmp_path):
+def test_more_generations_continue_from_fewer(short, whole, tmp_path):
     swarmevo.evolve(short, 4, progress=False, data_dir=tmp_path)
     seen = []
     same(swarmevo.evolve(short, progress=False, data_dir=tmp_path, callback=lambda it, _: seen.append(it.index)), whole)
@@ -192,7 +192,7 @@ def run_by_swarmctl(programs, file, directory, *arguments):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def test_swarmctl_goes_on_with_a_run_of_python_and_python_with_one_of_swarmctl(short, whole, programs, tmp_path):
+def test_swarmctl_continues_a_run_of_python_and_python_one_of_swarmctl(short, whole, programs, tmp_path):
     file = tmp_path / "short.json"
     file.write_text(short.to_json())
     for n in (2, 3):
@@ -208,7 +208,7 @@ def test_swarmctl_goes_on_with_a_run_of_python_and_python_with_one_of_swarmctl(s
     assert len(rows(fewer)) == 1
 
 
-def test_what_python_has_kept_is_sound_and_proves_itself(short, programs, tmp_path):
+def test_stored_runs_are_sound_and_verifiable(short, programs, tmp_path):
     swarmevo.evolve(short, progress=False, data_dir=tmp_path / "data")
     for command in (
         ["doctor", "--data-dir", tmp_path / "data"],

@@ -1,4 +1,4 @@
-"""Experiments and their simulation."""
+"""Experiments and their simulation in this process."""
 
 import pickle
 import signal
@@ -15,7 +15,7 @@ from swarmevo import Experiment, ExperimentError, TrialSet
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
-def test_fitness_does_not_depend_on_threads_trials_or_company(quickstart, genotypes):
+def test_fitness_does_not_depend_on_threads_trials_or_other_genotypes(quickstart, genotypes):
     fitness = quickstart.evaluate(genotypes, 3, threads=1)
     assert fitness.shape == (7, 3) and fitness.dtype == np.float64
     for threads in (2, 3, 16):
@@ -97,12 +97,12 @@ def test_genotypes_that_do_not_fit_are_refused(quickstart, genotypes, change, me
 
 
 @pytest.mark.parametrize("trials", [0, -1, range(0), range(0, 6, 2), range(-2, 3), 1001])
-def test_trials_that_there_are_not_are_refused(quickstart, genotypes, trials):
+def test_missing_trials_are_refused(quickstart, genotypes, trials):
     with pytest.raises(ValueError, match="trials"):
         quickstart.evaluate(genotypes, trials=trials)
 
 
-def test_the_interpreter_is_free_meanwhile(quickstart, genotypes):
+def test_computations_release_the_interpreter(quickstart, genotypes):
     many = np.tile(genotypes, (40, 1))
     counted, done = 0, threading.Event()
     worker = threading.Thread(target=lambda: (quickstart.evaluate(many, threads=1), done.set()))
@@ -129,14 +129,14 @@ def test_ctrl_c_interrupts(quickstart):
         signal.signal(signal.SIGALRM, before)
 
 
-def test_mirror_is_what_the_algorithms_do():
+def test_mirror_equals_the_reflection_of_the_algorithms():
     x = np.array([0.0, 0.25, 1.0, 1.25, -0.25, 2.25, -1.25, 1001.25])
     expected = [0.0, 0.25, 1.0, 0.75, 0.25, 0.25, 0.75, 0.75]
     assert swarmevo.mirror(x).tolist() == expected
     assert np.all((swarmevo.mirror([1e300, -1e300]) >= 0) & (swarmevo.mirror([1e300]) <= 1))
 
 
-def test_a_network_has_the_weights_that_its_genes_say(quickstart):
+def test_a_network_has_the_weights_that_its_genes_encode(quickstart):
     config = quickstart.to_dict()
     low = quickstart.network(np.zeros(424))
     high = quickstart.network(np.ones(424))

@@ -43,7 +43,7 @@ def test_every_name_is_there_once_and_documented():
             assert not (inspect.isclass(it) or inspect.isfunction(it)) or inspect.getdoc(it), name
 
 
-def test_every_representation_is_short_and_says_what_it_is(short, data):
+def test_every_representation_is_short_and_names_its_object(short, data):
     pytest.importorskip("pettingzoo")
     run = swarmevo.evolve(short, progress=False)
     archive = swarmevo.open(data)
@@ -64,7 +64,7 @@ def test_every_representation_is_short_and_says_what_it_is(short, data):
         assert "object at 0x" not in repr(it)
 
 
-def test_what_is_known_of_a_champion_has_names(short, data):
+def test_properties_of_a_champion_have_names(short, data):
     for champion in (swarmevo.evolve(short, progress=False).champion, swarmevo.open(data).run(1).champion):
         mean, low, high, n_trials = champion.judged
         assert (mean, low, high, n_trials) == (champion.judged.mean, champion.judged.low, champion.judged.high, champion.judged.n_trials)
@@ -81,7 +81,7 @@ def test_generations_are_one_list_of_one_type_here_and_of_records(short, data):
         there.history()[["generation", "best", "mean", "min", "standard_deviation", "digest"]]))
 
 
-def test_names_of_before_work_and_say_the_new_ones(data):
+def test_old_names_work_and_name_the_new_ones(data):
     run = swarmevo.open(data).run(1)
     with pytest.warns(DeprecationWarning, match="leave out the"):
         assert [it.summary.generation for it in run.generations()] == [0, 1, 2]
@@ -100,14 +100,14 @@ def test_fitness_is_read_without_genotypes(short, data, monkeypatch):
     assert run.fitness_log(range(0)).columns.tolist() == ["generation", "individual", "trial", "fitness"]
 
 
-def test_fitness_that_is_not_there_is_told_as_genotypes_are(data):
+def test_missing_fitness_and_missing_genotypes_are_the_same_error(data):
     run = swarmevo.open(data).run(1)
     for read in (run.fitness, run.individuals):
         with pytest.raises(swarmevo.FleetError, match="generation 3"):
             read(3)
 
 
-def test_what_is_no_such_thing_here_is_the_same_error_there(data):
+def test_unknown_individuals_and_runs_are_value_or_key_errors(data):
     archive = swarmevo.open(data)
     for wrong, kind in {"1@0/99": ValueError, "nonsense": ValueError, "1@0": ValueError, "9": KeyError}.items():
         with pytest.raises(kind) as refused:
@@ -162,14 +162,14 @@ except ModuleNotFoundError as error:
 
 
 @pytest.mark.parametrize("extra", PACKAGES)
-def test_a_missing_package_is_told_with_the_command_that_installs_it(extra, data):
+def test_the_error_of_a_missing_package_names_the_command_to_install_it(extra, data):
     for call in MISSING[extra]:
         script = SETUP.format(packages=PACKAGES[extra], call=call.format(data=str(data)))
         done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
         assert f"pip install 'swarmevo[{extra}]'" in done.stdout, (call, done.stdout, done.stderr)
 
 
-def test_every_extra_is_known_to_the_one_that_tells():
+def test_that_error_knows_every_extra():
     assert PACKAGES.keys() == EXTRAS.keys() - {"all", "progress"}
 
 

@@ -43,7 +43,7 @@ def test_every_figure_of_the_registry_is_in_the_documents_with_its_number():
     assert {it.name for it in (PROJECT / "docs/figures").glob("thesis-*")} == set(embedded.values())
 
 
-def test_one_command_writes_the_figures_that_are_asked_for_and_the_same_ones_twice(tmp_path):
+def test_one_command_writes_the_requested_figures_and_the_same_bytes_again(tmp_path):
     command = [sys.executable, "-m", "swarmevo.analysis.thesis", "leader_selection", "--trials", "2", "--only", "6.8", "-o"]
     for folder in ("once", "again"):
         subprocess.run([*command, tmp_path / folder], cwd=PROJECT, check=True, capture_output=True)
@@ -55,7 +55,7 @@ def test_one_command_writes_the_figures_that_are_asked_for_and_the_same_ones_twi
     assert "6.99 is no figure of leader_selection" in refused.stderr and "--trials: 2 or more" in refused.stderr
 
 
-def test_the_border_is_the_one_that_the_simulator_wants():
+def test_the_border_equals_that_of_the_simulator():
     for robots in (10, 30):
         trace = champion("borderline").trace(6, robots=robots, steps=1)
         for positions, targets in zip(trace.positions[:, 0], trace.targets[:, 0]):
@@ -99,14 +99,14 @@ def test_the_share_of_robots_that_see_the_light_is_that_of_the_file():
     assert (photosensitive(trace).sum(axis=1) <= 2).all() and photosensitive(trace).any()
 
 
-def test_the_other_way_of_the_light_is_another_way():
+def test_the_light_can_take_another_path():
     light = champion("light_follower")
     there = light.trace(1).lights
     other = other_way(light).simulate(light.genotype, 0, trials=1).lights
     assert there.shape == other.shape and not np.array_equal(there, other)
 
 
-def test_words_are_heard_as_they_were_said_as_many_steps_before_as_they_hopped():
+def test_words_are_heard_unchanged_one_step_later_per_hop():
     trace = champion("leader_selection").trace(3)
     trial, step, robot = np.nonzero(trace.frame_hops > 0)
     hops = trace.frame_hops[trial, step, robot].astype(int)

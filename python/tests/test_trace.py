@@ -37,7 +37,7 @@ def test_trials_are_the_same_one_by_one(quickstart, genotypes, trace):
         assert np.array_equal(getattr(one, name)[0], getattr(trace, name)[2]), name
 
 
-def test_what_a_robot_hears_was_sent_in_the_step_before(trace):
+def test_robots_hear_messages_of_the_previous_step(trace):
     # In the first ten steps, all send their own messages.
     heard = trace.frame_emitters[:, 1:10]
     assert (heard >= 0).any()
@@ -64,7 +64,7 @@ def test_tables_have_a_row_per_trial_step_and_robot(trace):
 
 
 def test_the_table_is_the_trace_of_swarmctl(quickstart, genotypes, programs, tmp_path):
-    """The same columns, and the same values, as ``swarmctl simulate --trace``."""
+    """``to_pandas`` has the columns and the values of ``swarmctl simulate --trace``."""
     file, genotype, out = (tmp_path / name for name in ("file.json", "genes.json", "trace.csv"))
     file.write_text(quickstart.to_json())
     genotype.write_text(json.dumps(genotypes[0].tolist()))
@@ -78,7 +78,7 @@ def test_the_table_is_the_trace_of_swarmctl(quickstart, genotypes, programs, tmp
     columns = quickstart.simulate(genotypes[0], 1).columns()
     assert len(rows) == len(columns["trial"])
     same = set(rows[0]) & set(columns)
-    # Their modes are words, and missing values are empty.
+    # In swarmctl's table, modes are words, and missing values are empty.
     assert set(rows[0]) - same == {"mode"} and set(columns) - same == {"sends"}
     for name in sorted(same - {"object"}):
         for row, value in zip(rows[::7], columns[name][::7]):

@@ -70,7 +70,7 @@ def test_processes_are_workers(started, quickstart, genotypes):
             assert_evaluates(started, quickstart, genotypes)
 
 
-def test_processes_that_would_share_this_one_s_connections_are_refused():
+def test_executors_that_fork_are_refused():
     forking = multiprocessing.get_context("fork")
     with concurrent.futures.ProcessPoolExecutor(1, mp_context=forking) as executor:
         with pytest.raises(ValueError, match="get_context..spawn"):

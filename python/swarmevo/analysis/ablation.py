@@ -32,9 +32,9 @@ class Lesion:
     weights: Floats
     """Number of synapses that the lesion removes."""
     fitness: float
-    """Mean over the trials without it."""
+    """Mean fitness over the trials, without the part."""
     change: float
-    """Mean over the trials of fitness without it minus fitness with it, in the same world and noise."""
+    """Mean change over the trials: fitness without the part minus fitness with it, in the same world and noise."""
     ci95: tuple[float, float]
     """Change ± 1.96 standard errors over trials."""
     is_same: bool

@@ -1,4 +1,4 @@
-"""How does the swarm solve its task? An answer in words, each backed by a number."""
+"""An answer to the question how the swarm solves its task: sentences, each backed by a number."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def _symbols(found: Findings) -> list[str]:
         it = found.spread
         said.append(
             f"A word is heard by {it.hearers:.1f} robots on average and {it.farthest} at most, after {it.longest} steps at the "
-            f"latest, and gets {it.speed:.0f} cm farther with each."
+            f"latest, and moves {it.speed:.0f} cm with each step."
         )
     return said
 

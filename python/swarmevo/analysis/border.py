@@ -48,8 +48,8 @@ def components(positions: ArrayLike, size: ArrayLike, reach: float) -> Iterator[
 
 def alpha_shape(points: ArrayLike, radius: float) -> tuple[Ints, Ints]:
     """The outer border of the alpha shape of ``points`` ``[K, 2]`` (Edelsbrunner, Kirkpatrick & Seidel
-    1983), with holes filled: that of the union of the Delaunay triangles whose circumradius is less than
-    ``radius``.
+    1983), with holes filled: the outer border of the union of the Delaunay triangles whose circumradius is
+    less than ``radius``.
 
     Returns the points that the union does not surround ``[B]``, in ascending order, and the edges of
     its outline ``[E, 2]``. All points are border if they lie on a line or if there is no such triangle.

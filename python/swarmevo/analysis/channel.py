@@ -121,8 +121,8 @@ def speaker_consistency(
     trace: Trace, action: ArrayLike, lags: Iterable[int] = range(5), *, first: int = FIRST
 ) -> dict[int, float]:
     """Speaker consistency by lag: the agreement of a robot's messages with its actions. Jaques et al.
-    (2019) average normalised conditional entropies; here it is the mutual information of the message
-    that a robot sends and its own action ``lag`` steps later, as a share of the message's entropy (the
+    (2019) average normalised conditional entropies. This function divides the mutual information of the
+    message that a robot sends and its own action ``lag`` steps later by the entropy of the message (the
     uncertainty coefficient, Theil 1970): 1 if the message follows from the action, 0 if it has no
     content.
     """
@@ -133,7 +133,7 @@ def speaker_consistency(
     for lag in (arguments.whole(it, "a lag") for it in lags):
         end = found.shape[1] - lag
         if lag < 0 or end <= 0:
-            raise ValueError(f"lag {lag} of a trace of {found.shape[1]} steps that count")
+            raise ValueError(f"lags are from 0 to {found.shape[1] - 1} for the {found.shape[1]} steps that count, not {lag}")
         there = sends[:, :end]
         said, did = found[:, :end][there], done[:, lag:][there]
         whole = entropy(said)

@@ -166,7 +166,7 @@ def _branch(path: _Path, share: float, start: Equilibrium, max_step: float, max_
 
 
 def _to_the_end(path: _Path, points: list[Floats], kinds: list[Equilibrium], shares: Floats) -> None:
-    """Moves the last point, which lies beyond, to the end of the way."""
+    """Moves the last point, which lies beyond the end of the way, to that end."""
     with needs("analysis"):
         from scipy.optimize import root
 

@@ -64,8 +64,8 @@ def influence(
 
     ``replace``: the new message, ``[M]`` or one number for all its values; ``"freeze"``, the agent's message
     of the previous step; ``"permute"``, the message of the next agent; ``"silence"``, no frame, not even a
-    relayed one, so that receivers hear the next strongest emitter. ``lasting``: the number of steps, within
-    the window.
+    relayed one, so that receivers hear the next strongest emitter. ``lasting``: the number of
+    steps that the replacement lasts, within the window.
     """
     case = _Case(experiment, genotype, steps, agents, trials, trial_set, window, lasting)
     if case.message_len == 0:
@@ -125,7 +125,7 @@ def attention(
     ``sensor``: ``wireless_receiver`` for all inputs from the radio, ``wireless_receiver:msg`` for one of them,
     another sensor of the network, or ``all``. ``replace``: a number, or the values ``[C]`` of these C inputs;
     ``"freeze"``, their values of the previous step; ``"permute"``, the readings of the next agent.
-    ``lasting``: the number of steps, within the window.
+    ``lasting``: the number of steps that the replacement lasts, within the window.
     """
     case = _Case(experiment, genotype, steps, agents, trials, trial_set, window, lasting)
     columns = input_columns(experiment, sensor)
@@ -145,7 +145,7 @@ def attention(
 
 
 def input_columns(experiment: Experiment, sensor: str) -> list[int]:
-    """The inputs of a network that a sensor, or one of its readings, feeds; those of ``all``."""
+    """The inputs of a network that a sensor, or one of its readings, feeds; all inputs for ``all``."""
     stimuli = [it for it in experiment.to_dict()["topology"]["stimuli"].values() for _ in range(it["n"])]
     names = [it["sensor"] for it in stimuli]
     found = [i for i, name in enumerate(names) if sensor in ("all", name) or name.startswith(f"{sensor}:")]
@@ -164,7 +164,7 @@ class _Case:
         window = arguments.whole(window, "window", 0)
         trials = arguments.whole(trials, "trials", 1, TRIALS_MAX)
         if not 1 <= arguments.whole(lasting, "lasting") <= window + 1:
-            raise ValueError(f"lasting from 1 to {window + 1}, the step and its window, not {lasting}")
+            raise ValueError(f"lasting is from 1 to {window + 1}, the step and its window, not {lasting}")
         self._experiment, self._genotype = experiment, experiment._genotype(genotype)
         self._trials, self._window = trials, window
         self._where = TrialSet.evaluation() if trial_set is None else trial_set
@@ -174,7 +174,7 @@ class _Case:
         self._n_agents = len(episodes.agents)
         self._chosen = list(range(self._n_agents)) if agents is None else [arguments.whole(it, "an agent", -arguments.SIZE_MAX) for it in agents]
         if not self.steps or min(self.steps) < 0 or max(self.steps) + 1 >= experiment.n_steps:
-            raise ValueError(f"steps from 0 to {experiment.n_steps - 2}, which have a step after them: {self.steps}")
+            raise ValueError(f"steps are numbered from 0 to {experiment.n_steps - 2}, the last but one, not {self.steps}")
         wrong = [agent for agent in self._chosen if not 0 <= agent < self._n_agents]
         if wrong:
             raise ValueError(f"agents are numbered from 0 to {self._n_agents - 1}, not {', '.join(map(str, wrong))}")
@@ -210,7 +210,7 @@ class _Course:
         self._fitness: list[NDArray[np.float64]] = []
 
     def run(self, episodes: Episodes, genotype: ArrayLike, change: _Said | _Sensed | None = None) -> None:
-        """Runs them. ``changed`` ``[T]`` tells whether ``change`` had an effect in each trial."""
+        """Runs the episodes. ``changed`` ``[T]`` tells whether ``change`` had an effect in each trial."""
         episodes.load(genotype)
         self.changed = np.zeros(episodes.n_trials, bool)
         for step in range(self.end):

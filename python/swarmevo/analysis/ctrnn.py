@@ -32,7 +32,7 @@ class Equilibrium:
     rates: Floats
     """``[N]``"""
     eigenvalues: NDArray[np.complex128]
-    """``[N]``: of the Jacobian of dv/dt there, largest real part first."""
+    """``[N]``: eigenvalues of the Jacobian of dv/dt there, largest real part first."""
 
     @property
     def is_stable(self) -> bool:
@@ -68,18 +68,18 @@ class CTRNN:
         activations: Sequence[str] | str = "sigmoid",
     ) -> None:
         """``weights[post, pre]`` ``[N, N]``; ``input_weights[post, input]`` ``[N, I]``, the unit matrix if
-        absent; the rest per neuron or one for all. ``activations``: ``sigmoid``, ``tanh``, ``identity``
-        or ``relu``."""
+        absent. The other arguments have a value per neuron, or one for all neurons. ``activations``:
+        ``sigmoid``, ``tanh``, ``identity`` or ``relu``."""
         self.weights: Floats = np.array(weights, dtype=np.float64)
         n = len(self.weights)
         if self.weights.shape != (n, n):
-            raise ValueError(f"weights of shape {self.weights.shape}; [N, N] is one")
+            raise ValueError(f"weights are an array [N, N], not {list(self.weights.shape)}")
         self.input_weights: Floats = np.eye(n) if input_weights is None else np.array(input_weights, np.float64)
         self.tau, self.bias, self.gain = (np.broadcast_to(np.asarray(it, np.float64), n) for it in (tau, bias, gain))
         self.activations = [activations] * n if isinstance(activations, str) else list(activations)
         unknown = set(self.activations) - set(_ACTIVATIONS)
         if unknown or len(self.activations) != n or len(self.input_weights) != n:
-            raise ValueError(f"{n} neurons, with activations of {sorted(_ACTIVATIONS)}: {sorted(unknown)}")
+            raise ValueError(f"{n} neurons need {n} activations of {sorted(_ACTIVATIONS)} and {n} rows of input weights; unknown: {sorted(unknown)}")
 
         self._of = {name: np.flatnonzero(np.array(self.activations) == name) for name in dict.fromkeys(self.activations)}
 

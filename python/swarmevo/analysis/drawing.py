@@ -82,7 +82,7 @@ def band(axis: Axes, values: ArrayLike, label: str, colour: str, linewidth: floa
 
 
 def bands(axis: Axes, curves: Mapping[str, ArrayLike]) -> None:
-    """A :func:`band` for each, with a legend."""
+    """A :func:`band` for each of the curves, with a legend."""
     for i, ((label, values), colour) in enumerate(zip(curves.items(), COLOURS)):
         # The first curve stays visible beneath others that coincide with it.
         band(axis, values, label, colour, linewidth=2.6 if i == 0 else 1.2)

@@ -39,7 +39,7 @@ class Input:
     fitness: Floats
     """``[T]``: without it."""
     change: Floats
-    """``[T]``: fitness without it minus fitness with it."""
+    """``[T]``: fitness without the input minus fitness with it."""
     usual: float
     """Share of its most frequent value, among the robots and steps with a reading."""
 
@@ -57,7 +57,7 @@ class Findings:
     """Inputs, the largest loss first."""
     conditions: list[Condition]
     use: ChannelUse | None
-    """None without radio; ``told``, ``heeded`` and the like are then empty."""
+    """None for robots without radio, whose other findings about messages are empty."""
     spread: Spread | None
     told: dict[str, Dependence]
     """The information of a message about its sender."""
@@ -65,7 +65,7 @@ class Findings:
     """The information of a message about its hearer's next action."""
     influence: Influence | None
     attention: dict[str, Attention]
-    """By sensor: the effect of zeros instead of its readings, for one step of one robot."""
+    """For each sensor: the effect of zeros instead of its readings, for one step of one robot."""
     lesions: dict[str, list[Lesion]]
     """Lesions of groups of synapses and of neurons, the largest loss first."""
     components: Components

@@ -20,7 +20,7 @@ from .variants import Config, evolved_robots, resize, spread_out
 from ..representation import short
 
 TRIALS_OF = TrialSet.generation_of(1_000_000)
-"""Trials that no run reaches, and that a fleet can compute: the same bits there and here."""
+"""Generation of the trials: no run reaches it, and a fleet can compute it, to the same bits as here."""
 
 
 @dataclass(frozen=True)

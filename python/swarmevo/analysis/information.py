@@ -48,7 +48,7 @@ def entropy(values: ArrayLike) -> float:
 def mutual_information(x: ArrayLike, y: ArrayLike) -> float:
     """Mutual information of two arrays of one shape, in bits, from their frequencies.
 
-    With few values it is too large by about (A - 1)(B - 1) / (2 N ln 2) (Miller 1955), where A and
+    With few values, the result is too large by about (A - 1)(B - 1) / (2 N ln 2) (Miller 1955), where A and
     B are the numbers of different values: :func:`dependence` adds the level of chance.
     """
     a, b = codes(x).reshape(-1), codes(y).reshape(-1)
@@ -74,9 +74,9 @@ class Dependence:
     bits: float
     """Measured mutual information."""
     chance: float
-    """Its mean if only chance relates them."""
+    """Mean mutual information if only chance relates the variables."""
     chance95: float
-    """Chance exceeds this value with a probability of 2.5 %."""
+    """The value that chance alone exceeds with a probability of 2.5 %."""
     p: float
     """Share of shuffles with at least as much information, at least 1 / (shuffles + 1)."""
 

@@ -18,7 +18,7 @@ class Proportion:
     share: float
     """The share; NaN if no row counts."""
     error: float
-    """Its standard error over trials; NaN for fewer than two."""
+    """Standard error of the share over trials; NaN for fewer than two trials."""
     rows: int
     """Number of counted rows."""
 

@@ -41,7 +41,7 @@ def report(
     trial, which has no intervals, and :class:`~swarmevo.OtherExperimentError` for a champion of another
     experiment; for a report under changed conditions, give its ``genotype``.
     """
-    trials = arguments.whole(trials, "trials of a report, which need intervals: their number", 2, TRIALS_MAX)
+    trials = arguments.whole(trials, "the number of trials of a report", 2, TRIALS_MAX)
     found = findings(experiment, genotype, trials=trials, client=client)
     trace = found.trace
     page = Page(title or experiment.name, Path(directory))
@@ -72,7 +72,7 @@ def _inputs(page: Page, found: Findings) -> None:
     page.table("inputs", ["input that is 0", "fitness", "change, in the same trials", "most frequent value in"], rows)
     page.note(
         "Mean over trials with its 95 % interval. The same worlds and noise with and without the input. "
-        "Last column: share of its most frequent value among its readings."
+        "Last column: share of the most frequent value among the readings of the input."
     )
 
 
@@ -83,7 +83,7 @@ def _conditions(page: Page, conditions: list[Condition]) -> None:
         for it in conditions
     ]
     page.table("conditions", ["changed", "to", "fitness", "from", "to (95 %)"], rows)
-    page.note("Mean over trials, the same in all rows except those of other sets, with its 95 % interval.")
+    page.note("Mean over trials, with its 95 % interval. All rows have the same trials, except those of other sets.")
 
 
 def _ends(condition: Condition) -> list[object]:
@@ -132,9 +132,9 @@ def _meaning(page: Page, found: Findings) -> None:
     page.table("signalling", ["the message sent tells of", *head[1:]], told)
     page.table("listening", ["the message heard tells of", *head[1:]], heeded)
     page.note(
-        "Mutual information. Chance: the same with the trials of one variable in another order. What is "
-        "heard and what is done may also depend on each other because neighbours sense alike; what happens "
-        "without the input, above, and without single messages, below, says whether they are heeded."
+        "Mutual information. Chance: the same with the trials of one variable in another order. A message "
+        "heard and an action may depend on each other only because neighbours sense alike. The fitness without "
+        "the input, above, and the effects of single messages, below, show whether robots heed messages."
     )
 
 
@@ -155,8 +155,8 @@ def _counterfactuals(page: Page, found: Findings) -> None:
         return
     page.table("counterfactuals", ["made 0", "times", "own actions differ", "others do", "LED differs, steps", "fitness"], rows)
     page.note(
-        "One at a time, with all noise as it was: what differs by a bit within 10 steps was caused by it. LED: "
-        "of others for a message, its own for what is sensed."
+        "One change at a time, with the same noise: it alone causes each difference of a bit within 10 steps. LED: of "
+        "other robots for a message, of the robot itself for a reading."
     )
     if it is None or not it.said.any():
         return

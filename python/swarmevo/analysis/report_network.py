@@ -27,7 +27,7 @@ def network(page: Page, found: Findings) -> None:
             for it in lesions
         ]
         page.table(f"lesions-{of}", [f"without ({of})", "synapses", "fitness", "change (95 %)"], rows, shown=SHOWN)
-    page.note(f"Weights of 0, with the same noise. The {SHOWN} largest losses; the CSV files have all.")
+    page.note(f"Each row sets weights to 0, with the same noise. The {SHOWN} largest losses; the CSV files have all.")
     _synapses(page, whole)
     _states(page, found)
     if found.settled:
@@ -99,9 +99,9 @@ def _alone(page: Page, found: Findings, whole: Network) -> None:
         ways.append([message(it.inputs.tolist()), points[0], points[1], bifurcations(branches)])
     page.table("continuation", [f"from {message(first.tolist())} to", "points that attract there", "and here", "on the way"], ways)
     page.note(
-        "Constant inputs, by frequency, rounded to 0.1, and the rates of the outputs' neurons where the state settles. On the way: "
-        "where equilibria that are followed from either end meet (fold) or begin to go round (Hopf), as a share of it. Episodes "
-        "change inputs faster than a network settles: the states above show its course in between."
+        "Constant inputs, by frequency, rounded to 0.1, and the rates of the output neurons where the state settles. On the way: "
+        "the shares of the way at which two equilibria meet (fold) or a cycle begins (Hopf). In episodes, inputs change faster "
+        "than a network settles: the states above show its course in between."
     )
 
 

@@ -30,7 +30,7 @@ class Settled:
     """The attractor of its state; None if, after 100 of the slowest time constants, it neither rests nor
     cycles."""
     outputs: dict[str, tuple[float, float]]
-    """Minimum and maximum rate of each neuron of an output there."""
+    """Minimum and maximum rate of each output neuron in the attractor."""
 
     __repr__ = short
 

@@ -20,8 +20,8 @@ def variant(
     without: str | None = None,
     perturbations: Config | None = None,
 ) -> Experiment:
-    """The experiment with another number of ``robots`` (and the same share of affected ones), of
-    ``steps``, with an input of 0 (``without``: a sensor, such as ``wireless_receiver:msg``), and with
+    """The experiment with changes: another number of ``robots`` (and the same share of affected ones),
+    another number of ``steps``, an input of 0 (``without``: a sensor, such as ``wireless_receiver:msg``),
     other ``perturbations`` than those of the file. Absent arguments change nothing.
 
     Conditions with the same number of robots have the same worlds and the same noise.

@@ -23,7 +23,7 @@ def half_width(values: NDArray[np.float64]) -> float:
 
 
 def message(values: Sequence[float]) -> str:
-    """Its values, with two digits: ``(1, 0.33)``."""
+    """The values of a message, with two digits: ``(1, 0.33)``."""
     return "(" + ", ".join(f"{value + 0.0:.2g}" for value in values) + ")"
 
 
@@ -36,7 +36,7 @@ def percent(it: Proportion | None) -> str:
 
 
 def share(value: float) -> str:
-    """A share, as percent: without decimals from 0.1 to 0.9, all of it as 100."""
+    """A share in percent: without decimals from 0.1 to 0.9 and for 1."""
     digits = 0 if 0.1 <= value <= 0.9 or value in (0.0, 1.0) else 1 if 0.001 <= value <= 0.999 else 2
     return f"{100 * value:.{digits}f} %"
 

@@ -1,4 +1,4 @@
-"""python -m swarmevo.analysis.thesis EXPERIMENT -o DIRECTORY: draws the thesis's figures of it."""
+"""python -m swarmevo.analysis.thesis EXPERIMENT -o DIRECTORY: draws the thesis's figures of the experiment."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def main() -> int:
 
 
 def file_name(number: str) -> str:
-    """``thesis-6.04.png`` of Fig. 6.4: so they sort."""
+    """The name of a figure's file, with a number that sorts: ``thesis-6.04.png`` of Fig. 6.4."""
     chapter, _, figure = number.partition(".")
     return f"thesis-{chapter}.{int(figure):02}.png"
 

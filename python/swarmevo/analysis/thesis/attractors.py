@@ -22,14 +22,14 @@ NETWORKS = {
     "b": CTRNN([[4.5, 1], [-1, 4.5]], bias=BIAS, input_weights=[[-0.2, 0], [-0.1, 0.1]]),
     "c": CTRNN([[4.5, 1], [-1, 4.5]], bias=BIAS, input_weights=[[1, -2], [-1, 1]]),
 }
-"""Of section 2.1.3, with the time constant of both neurons, 20 dt, as the unit of time."""
+"""The networks of section 2.1.3. The unit of time is the time constant of both neurons, 20 dt."""
 PATTERNS = ((0, 0), (0, 1), (1, 0), (1, 1))
 DT = 1 / 20
 HELD = 100
 """Duration of each pattern, in time constants: more than three periods of the cycles."""
 WAYS = {"a": ((0, 1), (1, 1), "a"), "b": ((1, 1), (0, 0), "c")}
-"""Fig. 2.3: first and last inputs, and a network of Fig. 2.2, because the thesis does not give those of Fig.
-2.3."""
+"""Fig. 2.3: first and last inputs, and a network of Fig. 2.2, because the thesis does not give the networks of
+Fig. 2.3."""
 START = (0.1, 0.0)
 
 

@@ -27,7 +27,7 @@ class Champion:
     ``swarmctl evaluate``, which had no part in evolution."""
 
     name: str
-    """Such as ``leader_selection``."""
+    """Name of the experiment, such as ``leader_selection``."""
     results: Path
     configs: Path
     trials: int

@@ -54,7 +54,7 @@ def fig_5(champion: Champion) -> Figure:
 
 
 def fig_6(champion: Champion) -> Figure:
-    """As Fig. 6.4, with faults."""
+    """Like Fig. 6.4, with faults."""
     figure, axis = canvas(5, 2.9)
     _by_size(axis, champion, True)
     return figure
@@ -175,7 +175,7 @@ def _what_is_sent(axis: Axes, trace: Trace) -> None:
 
 
 def symbol_name(message: tuple[float, ...]) -> str:
-    """Its values, as thirds if they are."""
+    """The values of a message, as thirds where they are thirds."""
     return "(" + ", ".join({0: "0", 33: "⅓", 67: "⅔", 100: "1"}.get(round(100 * it), f"{it:.2g}") for it in message) + ")"
 
 

@@ -226,7 +226,7 @@ def _parts(width: float, height: float) -> Figure:
 
 
 def _distance(positions: Floats, targets: Floats, extent: Floats) -> Floats:
-    """``[steps, R]`` on the torus, to ``targets`` ``[steps, 1, 2]``."""
+    """``[steps, R]``: distances on the torus to ``targets`` ``[steps, 1, 2]``."""
     way = positions - targets
     way -= extent * np.round(way / extent)
     return np.asarray(np.hypot(way[..., 0], way[..., 1]))
