@@ -4,8 +4,8 @@
     results/algorithms.py NAME [--generations G] [--seeds S...] [--algorithms A...] [--workers N]
 
 NAME is a file of configs/. Writes history and champion of each run to
-results/algorithms/NAME/ALGORITHM-SEED.csv and .json, for `swarmctl compare`; runs that are there
-already are left alone, so the command may be interrupted. Needs swarmctl in the PATH, Python 3.9 and
+results/algorithms/NAME/ALGORITHM-SEED.csv and .json, for `swarmctl compare`; leaves
+existing runs alone, so you may interrupt the command. Needs swarmctl in the PATH, Python 3.9 and
 nothing else.
 """
 
@@ -63,10 +63,10 @@ def evolve(experiment, seed, stem, workers):
             rows.writeheader()
             rows.writerows(generations)
         champion = json.loads(Path(end["champion_file"]).read_text())
-        # It follows from the genotype, and is five times as long.
+        # The network follows from the genotype, and is five times as long.
         del champion["network"]
         champion["digest"] = generations[-1]["digest"]
-        # Last: with it, the run is complete.
+        # This file comes last, because it marks the run as complete.
         Path(f"{stem}.json").write_text(json.dumps(champion) + "\n")
     return generations[-1]["mean"]
 

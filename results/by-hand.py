@@ -4,10 +4,10 @@
     results/by-hand.py [--trials N] [--record] [TASK...]
     results/by-hand.py [--trials N] --tune NAME=VALUE,VALUE... TASK
 
-For every TASK, by default all of configs/tasks/by_hand, evaluates results/champions/TASK-*.json, and robots
-that do what configs/tasks/by_hand/TASK.star says, on trials that no evolution uses. Prints means with
+For every TASK, by default all of configs/tasks/by_hand, evaluates results/champions/TASK-*.json, and the
+controller of configs/tasks/by_hand/TASK.star, on trials that no evolution uses. Prints means with
 their 95 % intervals: the fitness, and the share of the last third of an episode in which the task is solved,
-as its script defines it. For the tasks in FITNESS, this is the share of trials with that fitness.
+as its script defines it. For the tasks in FITNESS, the second number is the share of trials that reach this fitness.
 
 `--record` also writes the means into results/by-hand.csv, from which results/gallery.py makes a table.
 `--tune` tries every combination of values of the constants of a hand-written controller, on other trials,
@@ -53,7 +53,7 @@ def evaluation(task, config, champion, trials, options=()):
 
 
 def by_hand(task, folder, constants=()):
-    """The experiment file of a task in which the script decides what robots do."""
+    """The experiment file of a task whose robots are controlled by the hand-written script."""
     config = json.loads((TASKS / f"{task}.json").read_text())
     text = (TASKS / "by_hand" / f"{task}.star").read_text()
     for name, value in constants:

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Prints GA and SNES side by side on every task, as `swarmctl compare` has them, as a table.
+"""Prints a table of GA and SNES on every task, with the numbers of `swarmctl compare`.
 
     results/compare.py
 
-Each value is the median over the runs in results/, in brackets the least and the greatest: run
-results/fetch before, for all seeds. Needs swarmctl in the PATH, Python 3.9 and nothing else.
+Each value is the median over the runs in results/, in brackets the least and the greatest. To have
+all seeds, run results/fetch before. Needs swarmctl in the PATH, Python 3.9 and nothing else.
 """
 
 import json
@@ -23,7 +23,7 @@ QUANTITIES = {"judged": "champion", "mean": "mean, last 50", "best": "best, last
 
 
 def compared(task):
-    """What `swarmctl compare` says of a task; nothing without runs by both algorithms."""
+    """The output of `swarmctl compare` for a task; None without runs by both algorithms."""
     files = [sorted((RESULTS / folder).glob(f"{task}_{algorithm}-*"))
              for algorithm in ("ga", "snes") for folder in ("histories", "champions")]
     if not all(files):

@@ -27,7 +27,7 @@ GENES_OF_A_NEURON = 3
 
 
 def numpy_generator(seed):
-    """The Mersenne Twister as numpy.random.seed(seed) begins it; `random` of both then agree."""
+    """The Mersenne Twister in the state of numpy.random.seed(seed): `random` gives the same numbers."""
     words = [seed]
     for i in range(1, 624):
         words.append((1812433253 * (words[-1] ^ (words[-1] >> 30)) + i) & 0xFFFFFFFF)

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Evolves experiments with one thing changed at a time, and prints what the change does.
+"""Evolves experiments with one thing changed at a time, and prints the effects.
 
     results/hypotheses.py run [EXPERIMENT...] [--variants V...] [--seeds S...] [--workers N]
     results/hypotheses.py report
 
 EXPERIMENT is a name in the table below; `report` prints every experiment. `run` writes history and
-champion of each run to results/hypotheses/EXPERIMENT/VARIANT-SEED.csv and .json, and leaves alone the
-runs that exist, so it may be interrupted. The variant `as it is` is the file unchanged, whose runs are in
-results/histories. `run` needs swarmctl in the PATH. Python 3.9 and nothing else.
+champion of each run to results/hypotheses/EXPERIMENT/VARIANT-SEED.csv and .json, and leaves
+existing runs alone, so you may interrupt it. The variant `as it is` is the unchanged file, whose runs are in
+results/histories. Needs Python 3.9, and for `run` swarmctl in the PATH.
 """
 
 import argparse
@@ -48,7 +48,7 @@ LONG_RADIO = {
     "topology.stimuli.I1.n": 3,
     "topology.ensembles.OUT_COMM.n": 3,
 }
-# By experiment, a file of configs/original: what each variant changes in it.
+# For each experiment, a file of configs/original: the changes of each variant.
 VARIANTS = {
     "borderline_ga_program": {
         "LED and mode drawn": DRAWN,
@@ -81,12 +81,12 @@ AS_IT_IS = "as it is"
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
-    run = commands.add_parser("run", help="evolve what is missing")
+    run = commands.add_parser("run", help="evolve missing runs")
     run.add_argument("experiments", nargs="*", default=list(VARIANTS), metavar="EXPERIMENT")
     run.add_argument("--variants", nargs="+")
     run.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     run.add_argument("--workers", type=int, default=1)
-    commands.add_parser("report", help="print what is there")
+    commands.add_parser("report", help="print existing runs")
     args = parser.parse_args()
     if args.command == "report":
         report()
@@ -124,7 +124,7 @@ def changed(experiment, changes):
 
 
 def stem_of(name, variant, seed):
-    """Where a run is, without the ending of a file's name."""
+    """The path of a run's files, without their endings."""
     folder = RESULTS / "hypotheses" / name
     return folder / f"{variant.replace(' ', '-').replace(',', '')}-{seed}"
 

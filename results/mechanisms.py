@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Prints what champions send and how they react to what they hear and see, as tables.
+"""Prints tables of the messages of champions, and of their reactions to frames and light.
 
     results/mechanisms.py [DIRECTORY] [--trials N]    champions in it; results/ by default
 
-Every champion is simulated in N trials, 20 by default, that had no part in its evolution; steps 0 to
-9, in which robots are made to send, count for negotiations only. A robot acts on the stimuli of the
+Simulates every champion in N trials, 20 by default, that had no part in its evolution. Steps 0 to 9,
+in which robots must send, count for negotiations only. A robot acts on the stimuli of the
 same row of the trace.
 Needs swarmctl in the PATH, Python 3.9 and nothing else.
 """
@@ -21,11 +21,11 @@ from pathlib import Path
 
 from report import RESULTS, table
 
-WINDOW = 10  # steps in which a robot counts from how many sectors it heard frames
+WINDOW = 10  # number of steps over which heard sectors are counted
 
 
 def percent(values):
-    """Share of true values with its standard error over trials: rows of a trial are no sample."""
+    """Share of true values with its standard error over trials, because rows of a trial depend on each other."""
     shares = [100 * statistics.fmean(of) for of in by_trial(values).values()]
     error = statistics.stdev(shares) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
     return f"{100 * statistics.fmean(value for _, value in values):.1f} ± {error:.1f} %"
@@ -54,7 +54,7 @@ def message(row):
 
 
 def conditional(title, condition, event, rows):
-    """How often `event` is true, by `condition`; rows whose condition is None do not count."""
+    """The share of rows where `event` is true, for each `condition`; rows with the condition None do not count."""
     groups = defaultdict(list)
     for row in rows:
         groups[condition(row)].append((row["trial"], event(row)))
@@ -81,8 +81,8 @@ def leds(rows, frequent):
 
 
 def negotiations(rows):
-    """Of each trial, how long it takes until a robot is the only leader for ten steps, and whether
-    before that all LEDs went off again."""
+    """For each trial: the time until one robot is the only leader for ten steps, and whether all LEDs went
+    off again before."""
     lit = defaultdict(lambda: defaultdict(list))
     for row in rows:
         lit[row["trial"]][int(row["step"])].extend([row["robot"]] if is_lit(row) else [])
@@ -123,7 +123,7 @@ def neighbours(rows):
 
 
 def angle(row, stimulus):
-    """Direction of a sector that is given as (x, y) in [0, 1], in degrees; None without a frame."""
+    """The direction in degrees of a sector, which is given as (x, y) in [0, 1]; None without a frame."""
     if row["frame_sector"] == "":
         return None
     x, y = (float(row[f"stimulus_{stimulus}_{i}"]) for i in (0, 1))
@@ -149,19 +149,20 @@ def alignment(rows, stimuli):
 
 
 def signals(rows, config):
-    """The strength of frames, compared with what section 3.3.2 has in its place: the distance sensor's
-    reading of that sector, the largest over all robots within 60 cm, here with the receiver's decay."""
+    """Compares the strength of frames with the value that section 3.3.2 uses instead: the reading of the
+    distance sensor in that sector, which is the largest over all robots within 60 cm, here with the decay of
+    the receiver."""
     robot = config["world"]["objects"][config["algorithm"]["evolvable_object"]]
     receiver, sides = robot["sensors"]["wireless_receiver"], (config["world"]["width"], config["world"]["height"])
     if "decay_rho" not in receiver:
-        return  # left to the file's semantics
+        return  # this file leaves the signal to its key `semantics`
     swarms = defaultdict(dict)
     for row in rows:
         heading = float(row["heading_rad"])
         swarms[row["trial"], int(row["step"])][row["robot"]] = (float(row["x_cm"]), float(row["y_cm"]), heading)
     differences = []
     for row in rows:
-        # Rows have positions after the step, robots hear from those before it.
+        # Rows have the positions after a step, but robots hear at the positions before it.
         swarm = swarms.get((row["trial"], int(row["step"]) - 1))
         if swarm is None or row["frame_sector"] == "":
             continue

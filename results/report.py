@@ -3,7 +3,7 @@
 
     results/report.py [DIRECTORY]    runs and evaluations in it; results/ by default
 
-Run results/fetch before: the report is about all seeds, and a clone's tree has one of each run.
+Run results/fetch before: the report covers all seeds, and a clone's tree has one seed of each run.
 Needs Python 3.9 and nothing else. `swarmctl compare` prints the statistics of samples.
 """
 
@@ -49,7 +49,7 @@ def read_csv(path):
 
 
 def print_or_update(page, name, text):
-    """Prints a table; with `--update`, writes it between the marks of its name in a page."""
+    """Prints a table; with `--update`, writes it into a page, between the marks with its name."""
     if sys.argv[1:] != ["--update"]:
         print(text, end="")
         return
@@ -109,7 +109,7 @@ def models(folder):
             if paths:
                 rows.append([task, model, seeds, *map(until, ENDS)])
     if any(row[1] != "CTRNN" for row in rows):
-        print("## Neuron models: mean fitness over the ten generations before, one per seed\n")
+        print("## Neuron models: mean fitness over the ten generations before, a value per seed\n")
         table(["task", "neurons", "seeds", *(f"generation {end}" for end in ENDS)], rows)
 
 
@@ -126,7 +126,7 @@ def evaluation(folder):
     )
     print("Mean over trials of the mean over time; in brackets the median.\n")
     means(lambda values: values and f"{statistics.fmean(values):.3f} [{statistics.median(values):.3f}]")
-    print("Of the same, the quartiles.\n")
+    print("Quartiles of the mean over time.\n")
     means(quartiles)
     if "true_positive_rate" in metrics:
         errors(folder, trials)
@@ -158,7 +158,7 @@ def quartiles(values):
 
 
 def errors(folder, trials):
-    """Wrong LEDs per step. A trial has one border, so that its size follows from the rates:
+    """Wrong LEDs per step. A trial has one border, whose size follows from the rates:
     accuracy * n = TPR * border + TNR * (n - border)."""
     name = json.loads((folder / "summary.json").read_text())["name"]
     config = json.loads(next((RESULTS.parent / "configs").rglob(f"{name}.json")).read_text())
@@ -183,14 +183,14 @@ def errors(folder, trials):
 
 
 def estimate(values, digits=3):
-    """Their mean with its 95 % interval, of the normal distribution."""
+    """The mean of values with its 95 % interval, by the normal distribution."""
     mean, error = statistics.fmean(values), 1.96 * statistics.stdev(values) / len(values) ** 0.5
     return f"{mean:.{digits}f} ({mean - error:.{digits}f} to {mean + error:.{digits}f})"
 
 
 def lost_lights(folder):
-    """Trials in which those that see the light are near it for less than half of the time, and those
-    in which only the others are."""
+    """Trials in which the robots that see the light are near it for less than half of the time, and trials
+    in which this holds only for the other robots."""
     near = defaultdict(dict)
     for row in read_csv(folder / "trials.csv"):
         if row["metric"].startswith("near_light_"):
@@ -209,7 +209,7 @@ def lost_lights(folder):
 
 
 def fisher(first, second):
-    """Fisher's exact test of two samples, two-sided; of each, how many do not and how many do."""
+    """Fisher's exact test of two samples, two-sided. A sample: the numbers of trials without and with the event."""
     n, marked = sum(first), first[1] + second[1]
     ways = lambda k: math.comb(n, k) * math.comb(sum(second), marked - k)
     all_ways = [ways(k) for k in range(min(n, marked) + 1)]

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Prints what each reading of the thesis comes to: its tables, and the constants of SpikeSwarmSim.
+"""Prints the outcome of each reading of the thesis: of its tables, and of the constants of SpikeSwarmSim.
 
     results/thesis.py              the table of docs/reproduction.md
     results/thesis.py --update     writes it into that page
 
-The mean fitness is that of the last 50 generations, a median over the runs, in brackets the least and
-the greatest. A champion's worth is the median run's, with its 95 % interval, then the range over all
-runs. Readings without runs in results/ have no row. Needs Python 3.9 and nothing else.
+The mean fitness is that of the last 50 generations: the median over the runs, in brackets the least and
+the greatest. The worth is that of the champion of the median run, with its 95 % interval, then the range
+over all runs. Readings without runs in results/ have no row. Needs Python 3.9 and nothing else.
 """
 
 import json
