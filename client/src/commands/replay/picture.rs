@@ -216,15 +216,21 @@ fn smooth(
         let area = BitMapBackend::with_buffer(&mut drawn, (fine, fine)).into_drawing_area();
         draw::draw(&area, fine, camera, discs, way).map_err(internal)?;
     }
-    let (side, times, row) = (side as usize, times as usize, 3 * fine as usize);
+    let (side, times) = (side as usize, times as usize);
     let mut pixels = Vec::with_capacity(3 * side * side);
-    for y in 0..side {
-        for x in 0..3 * side {
-            let first = times * y * row + 3 * times * (x / 3) + x % 3;
-            let block = (0..times).flat_map(|i| (0..times).map(move |k| first + i * row + 3 * k));
-            let sum: usize = block.map(|at| usize::from(drawn[at])).sum();
-            pixels.push((sum / (times * times)) as u8);
+    let mut sums = vec![[0; 3]; side];
+    for lines in drawn.chunks_exact(3 * fine as usize * times) {
+        sums.fill([0; 3]);
+        for line in lines.chunks_exact(3 * fine as usize) {
+            for (sum, block) in sums.iter_mut().zip(line.chunks_exact(3 * times)) {
+                for [red, green, blue] in block.as_chunks().0 {
+                    sum[0] += usize::from(*red);
+                    sum[1] += usize::from(*green);
+                    sum[2] += usize::from(*blue);
+                }
+            }
         }
+        pixels.extend(sums.as_flattened().iter().map(|sum| (sum / (times * times)) as u8));
     }
     Ok(pixels)
 }

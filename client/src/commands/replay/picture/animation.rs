@@ -24,8 +24,8 @@ impl Palette {
     pub fn from_frames<'a>(frames: impl Iterator<Item = &'a [u8]>) -> Self {
         let mut counts: BTreeMap<Rgb, usize> = BTreeMap::new();
         for frame in frames {
-            for pixel in frame.as_chunks().0 {
-                *counts.entry(*pixel).or_default() += 1;
+            for run in runs(frame) {
+                *counts.entry(run[0]).or_default() += run.len();
             }
         }
         let mut colors: Vec<(Rgb, usize)> = counts.into_iter().collect();
@@ -59,6 +59,11 @@ impl Palette {
     }
 }
 
+/// The pixels of a frame in runs of one colour, most of which are long.
+fn runs(frame: &[u8]) -> impl Iterator<Item = &[Rgb]> {
+    frame.as_chunks().0.chunk_by(|a, b| a == b)
+}
+
 /// Writes frames of `side` pixels one after the other.
 pub struct Frames {
     side: usize,
@@ -78,8 +83,10 @@ impl Frames {
         writer: &mut Writer<W>,
         frame: &[u8],
     ) -> Result<(), EncodingError> {
-        let pixels = frame.as_chunks().0;
-        let next: Vec<u8> = pixels.iter().map(|pixel| self.palette.place(*pixel)).collect();
+        let mut next = Vec::with_capacity(frame.len() / 3);
+        for run in runs(frame) {
+            next.resize(next.len() + run.len(), self.palette.place(run[0]));
+        }
         if self.shown.is_empty() {
             self.shown = next;
             return writer.write_image_data(&self.shown);
