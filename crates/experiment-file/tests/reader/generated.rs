@@ -20,7 +20,7 @@ pub fn n_files() -> u64 {
 
 /// Number of files to simulate, which takes longer than to read them.
 fn n_simulations() -> u64 {
-    (2 * n_files()).min(1_000)
+    (2 * n_files()).min(1_100)
 }
 
 #[test]
