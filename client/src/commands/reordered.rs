@@ -50,8 +50,8 @@ fn may_be_reordered(earlier: &Experiment, later: &Experiment) -> bool {
         && earlier.forked_from.is_none()
 }
 
-/// A file in canonical form as a value that does not depend on the order of its keys, nor on
-/// the length of the run, which a digest does not cover.
+/// The content of a file in canonical form, without the order of its keys, and without the length
+/// of the run, which no digest covers.
 fn without_order(config_json: &str) -> Option<Value> {
     let config = ExperimentConfig::from_canonical_json(config_json).ok()?;
     serde_json::to_value(Digest::covered(config)).ok()
