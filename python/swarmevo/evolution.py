@@ -86,10 +86,10 @@ class Evolution:
 
     def tell(self, fitness: ArrayLike) -> Generation:
         """Learns from the fitness of the genotypes that :meth:`ask` gave: ``[P]``, or
-        ``[P, T]`` for T trials of each, whose mean counts. Warns (``EvolutionWarning``) where a
-        coordinator writes a notice: fitness that is not finite, or the same for all individuals in
-        ten generations, and distributions that are a point or far wider than the genes' range.
-        Raises ``EvolutionError``, a ValueError, and stays unchanged where a coordinator's run fails:
+        ``[P, T]`` for T trials of each, whose mean counts. Warns (``EvolutionWarning``) of what a
+        coordinator reports as notices: fitness that is not finite, or that is the same for all
+        individuals in ten generations; a distribution that is a point, or far wider than the range
+        of genes. Raises ``EvolutionError``, a ValueError, and stays unchanged where a coordinator's run fails:
         if no fitness is finite, or evolution cannot learn any more."""
         told = self._tell(fitness)
         for notice in told.notices:

@@ -264,8 +264,8 @@ class Experiment:
     ) -> Experiment:
         """A copy of the experiment, with these changes.
 
-        ``algorithm``: its class or its name in experiment files, such as ``"CMA-ES"``; a new one drops the
-        parameters of the previous algorithm, and ``params`` sets those that differ from the defaults, for all
+        ``algorithm``: its class or its name in experiment files, such as ``"CMA-ES"``. A new algorithm drops the
+        parameters of the previous one; ``params`` sets parameters that differ from the defaults, for all
         populations. ``params`` without ``algorithm`` changes parameters of the experiment's algorithm.
         ``settings``: any other key of ``algorithm`` in the file, such as ``num_evaluations`` or
         ``evaluation_steps``. Raises :class:`ExperimentError` with all mistakes.
