@@ -111,8 +111,9 @@ const COLUMNS: &str =
      (SELECT max(sequence) FROM events WHERE experiment_id = e.id),
      e.group_name, e.variant, e.log_from, e.log_gap,
      f.parent_id, f.generation, f.link, f.changes, e.labels, e.archived,
-     (SELECT avg(r.duration_ms) FROM generations r
-      WHERE r.experiment_id = e.id AND r.generation > g.generation - 10),
+     CASE WHEN e.state IN ('running', 'paused') THEN
+         (SELECT avg(r.duration_ms) FROM generations r
+          WHERE r.experiment_id = e.id AND r.generation > g.generation - 10) END,
      e.summary";
 
 const TABLES: &str = "experiments e

@@ -133,7 +133,8 @@ pub struct ExperimentRecord {
     pub labels: Labels,
     /// Whether lists leave it out.
     pub is_archived: bool,
-    /// Mean wall-clock time of its latest generations, ms; `None` before the first.
+    /// Mean wall-clock time of its latest generations, ms; `None` before the first, and once it
+    /// has ended.
     pub recent_generation_ms: Option<f64>,
     /// The first generation in its fitness log; the next generation if the log is empty.
     pub log_from: u64,

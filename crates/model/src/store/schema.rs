@@ -304,6 +304,33 @@ pub(super) const MIGRATIONS: &[&str] = &[
     CREATE INDEX experiments_by_state ON experiments (state);
 "
     ),
+    // Lists of many experiments omit the genes, too.
+    "
+    CREATE TABLE listed_champions (
+        experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
+        generation INTEGER NOT NULL,
+        individual INTEGER,
+        held_out_mean REAL,
+        held_out_ci95 REAL,
+        held_out_trials INTEGER,
+        held_out_generation INTEGER,
+        judged_mean REAL,
+        judged_low REAL,
+        judged_high REAL,
+        judged_trials INTEGER,
+        judged_generation INTEGER,
+        seal BLOB NOT NULL DEFAULT x'',
+        trial_fitness TEXT NOT NULL,
+        genotype TEXT NOT NULL
+    ) STRICT;
+    INSERT INTO listed_champions
+    SELECT experiment_id, generation, individual, held_out_mean, held_out_ci95, held_out_trials,
+           held_out_generation, judged_mean, judged_low, judged_high, judged_trials,
+           judged_generation, seal, trial_fitness, genotype
+    FROM champions;
+    DROP TABLE champions;
+    ALTER TABLE listed_champions RENAME TO champions;
+",
 ];
 
 /// The first version with seals.

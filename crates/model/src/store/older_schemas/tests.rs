@@ -128,7 +128,7 @@ fn released_migrations_stay_as_they_are() {
         digests.collect::<Vec<_>>(),
         [
             "b9a7777d", "54864f37", "1799e364", "59bb63f0", "122ab170", "23bb2022", "0a27952a",
-            "875bbdd8", "1addcd31", "1333a318", "d87a0e15"
+            "875bbdd8", "1addcd31", "1333a318", "d87a0e15", "36e4d691"
         ]
     );
 }

@@ -6,17 +6,19 @@
 
 use std::{env, time::Instant};
 
-use coordinator::{
+use evolution::{
+    ALGORITHMS, Champion, ChampionSource, Digest, Evolution, HeldOut, Judged, Real, Statistics,
+};
+use experiment_file::ExperimentConfig;
+use model::{
     priority::Priority,
+    queries::BlockingReader,
     store::{Entry, GenerationCommit, GenerationRecord, NewExperiment, Store},
 };
-use evolution::{ALGORITHMS, Digest, Evolution, Statistics};
-use experiment_file::ExperimentConfig;
-use model::queries::BlockingReader;
 use prost::Message as _;
 use swarm_proto::v1::{ExperimentState, ListExperimentsRequest, ListExperimentsResponse};
 
-const SNES: &str = include_str!("../../configs/leader_selection_snes.json");
+const SNES: &str = include_str!("../../../configs/leader_selection_snes.json");
 /// How often each request is sent; the median counts.
 const REPETITIONS: usize = 9;
 
@@ -76,7 +78,8 @@ fn new_experiment() -> NewExperiment {
     }
 }
 
-/// An experiment with 12 generations; one in a hundred is unfinished.
+/// An experiment with 12 generations, the first and the last of which have a champion; one in a
+/// hundred is unfinished.
 fn put(store: &mut Store, new: &NewExperiment, i: usize) {
     let mut new = new.clone();
     new.config.name = format!("run-{i}");
@@ -94,14 +97,37 @@ fn put(store: &mut Store, new: &NewExperiment, i: usize) {
             idle_share: 0.5,
         };
         let is_last = generation + 1 == n_generations && !i.is_multiple_of(100);
+        let champion = (generation == 0 || generation + 1 == n_generations)
+            .then(|| champion(&new, generation, is_last));
         let commit = GenerationCommit {
             generation: &record,
             entry: Entry { told: &[0; 400], keyframe: None },
-            champion: None,
+            champion: champion.as_ref(),
             digest: &record.digest,
             notices: &[],
             completed: is_last.then_some(""),
         };
         store.commit_generation(id, 0, &commit).expect("the database can be written");
+    }
+}
+
+/// A champion with genes of all digits; `is_judged`: whether the run has ended.
+fn champion(new: &NewExperiment, generation: u64, is_judged: bool) -> Champion {
+    let algorithm = &new.config.algorithm;
+    let fraction = |i: usize| (i as f64 * std::f64::consts::PI).fract();
+    let mean = Real::new(0.5).expect("it is a number");
+    Champion {
+        generation,
+        source: ChampionSource::Individual(7),
+        genotype: (1..=new.genotype_len).map(fraction).collect(),
+        trial_fitness: (1..=algorithm.num_evaluations as usize).map(fraction).collect(),
+        held_out: HeldOut::from_values(&[0.1, 0.2], generation),
+        judged: is_judged.then_some(Judged {
+            mean,
+            low: mean,
+            high: mean,
+            n_trials: 100,
+            generation,
+        }),
     }
 }
