@@ -143,3 +143,40 @@ fn say(output: &mut impl Write, message: work_request::Message) -> io::Result<()
     output.write_all(&message.encode_length_delimited_to_vec())?;
     output.flush()
 }
+
+#[cfg(test)]
+mod tests {
+    use sim_core::TrialSet;
+
+    use super::*;
+    use crate::ids::EvaluationId;
+
+    #[test]
+    fn a_job_that_has_ended_is_forgotten() {
+        let job = || Some(codec::job(EvaluationId(1).into()));
+        // It does not compile, and an item of it fails.
+        let spec = || Message::Spec(v1::JobSpec { job: job(), config_json: String::new() });
+        let item = || {
+            Message::Assignments(v1::Assignments {
+                job: job(),
+                trial_set: Some(codec::trial_set(TrialSet::Evaluation)),
+                output: v1::Output::Fitness.into(),
+                assignments: vec![v1::Assignment::default()],
+            })
+        };
+        let end = || Message::EndJob(v1::EndJob { job: job() });
+        let answer = |messages: Vec<Message>| {
+            let (sender, requests) = mpsc::channel();
+            for message in messages {
+                sender.send(Ok(Some(v1::WorkResponse { message: Some(message) }))).unwrap();
+            }
+            sender.send(Ok(None)).unwrap();
+            let mut output = Vec::new();
+            answer(&requests, &mut output, &AtomicBool::new(false)).map(|()| output.len())
+        };
+        let n_bytes = answer(vec![end(), spec(), item()]).unwrap();
+        assert!(answer(vec![spec(), item(), end(), spec(), item()]).unwrap() > n_bytes);
+        let error = answer(vec![spec(), item(), end(), item()]).unwrap_err();
+        assert_eq!(error.to_string(), "a job has no specification");
+    }
+}

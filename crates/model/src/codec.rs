@@ -96,6 +96,7 @@ mod tests {
         for wanted in [Output::Fitness, Output::Measures] {
             assert_eq!(read_output(output(wanted)), Some(wanted));
         }
+        assert_eq!(read_output(v1::Output::Unspecified), None);
     }
 
     #[test]
