@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 use sim_core::TRYING_TIME_MAX;
 
 use crate::{
-    byte_budget::{ByteBudget, TakenBytes},
+    byte_budget::{self, ByteBudget, TakenBytes},
     limits::{CHECKS_MAX, REQUESTS_LEN_MAX},
 };
 
@@ -17,8 +17,8 @@ use super::{
     turns::{Client, Turns},
 };
 
-/// Bytes that a request takes beside its content: at least the unit of a `ByteBudget`.
-const REQUEST_LEN: usize = 16 << 10;
+/// Bytes that a request takes beside its content; a budget does not count less.
+const REQUEST_LEN: usize = byte_budget::UNIT;
 
 /// Requests of clients in progress: in a check, waiting, or evaluated.
 #[derive(Debug, Clone)]
