@@ -190,7 +190,7 @@ fn throughput() -> f64 {
     let started = Instant::now();
     let mut engine = Engine::new(started, EngineConfig::new(LEASE));
     for worker in 0..10_000 {
-        let name = format!("worker-{worker}");
+        let name = format!("worker-{worker}").into();
         let version = String::new();
         engine.on_worker_joined(
             started,

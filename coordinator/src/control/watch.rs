@@ -76,8 +76,8 @@ impl Situation {
 impl Stage {
     fn from_explanation(Explanation { activity, .. }: &Explanation) -> Self {
         let Some(batch) = &activity.batch else { return Self::None };
-        let is_long = batch.held.iter().any(|held| held.held_for >= LONG);
-        match (batch.n_items_queued, batch.held.is_empty()) {
+        let is_long = batch.shares.iter().any(|share| share.oldest_for >= LONG);
+        match (batch.n_items_queued, batch.shares.is_empty()) {
             (0, false) if is_long => Self::Barrier,
             (0, true) if batch.n_audits_waiting > 0 => Self::Audits,
             (1.., true) if !activity.rivals.is_empty() => Self::Others,

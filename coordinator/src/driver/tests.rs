@@ -49,7 +49,7 @@ impl Rig {
         let (reply, id) = oneshot::channel();
         let link = WorkerLink { outbox, dropped: CancellationToken::new() };
         let introduction = Introduction {
-            name: "w".to_owned(),
+            name: "w".into(),
             version: String::new(),
             n_slots: 1000,
             experiments: NamePattern::default(),

@@ -34,12 +34,13 @@ impl Driver {
         let id = self.engine.on_worker_joined(clock::now(), introduction);
         // The worker is welcomed before it gets work, because commands are carried out after
         // this.
-        self.workers.insert(id, ConnectedWorker { name: name.clone(), link, is_draining: false });
+        self.workers
+            .insert(id, ConnectedWorker { name: name.to_string(), link, is_draining: false });
         self.send(id, ToWorker::Welcome(id));
         self.fleet_news.send_modify(|count| *count += 1);
         let fleet = self.engine.fleet_size();
         info!(
-            worker = %id, name, version, slots = n_slots, %experiments,
+            worker = %id, name = &*name, version, slots = n_slots, %experiments,
             workers = fleet.n_workers, total_slots = fleet.n_slots,
             "worker joined"
         );

@@ -10,7 +10,8 @@ use sim_core::TrialSet;
 use crate::ids::{JobId, WorkerId};
 
 use super::{
-    Engine, availability::Availability, batch::BatchInProgress, job::JobWork, worker::Worker,
+    Engine, availability::Availability, batch::BatchInProgress, job::JobWork, trust::OpenQuestion,
+    worker::Worker,
 };
 
 /// The present activity of a job, and the workers that could compute it.
@@ -45,17 +46,6 @@ pub struct WithheldWorker {
     pub is_quarantined: bool,
 }
 
-/// An item that the referee computes, or will.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OpenQuestion {
-    /// The item's individual.
-    pub individual: u32,
-    /// The doubt that the referee settles.
-    pub doubt: String,
-    /// Why the referee could not answer so far.
-    pub trouble: Option<String>,
-}
-
 /// A batch that is being computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchActivity {
@@ -73,14 +63,14 @@ pub struct BatchActivity {
     /// result.
     pub n_individuals_failing: usize,
     /// The workers that have the other items.
-    pub held: Vec<HeldItems>,
+    pub shares: Vec<WorkerShare>,
     /// Time since it began.
     pub running_for: Duration,
 }
 
 /// Items of a batch that a worker has.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HeldItems {
+pub struct WorkerShare {
     /// The worker.
     pub worker: WorkerId,
     /// Its name.
@@ -88,7 +78,7 @@ pub struct HeldItems {
     /// Number of items.
     pub n_items: usize,
     /// Time since the oldest of these assignments.
-    pub held_for: Duration,
+    pub oldest_for: Duration,
     /// Time since its last message.
     pub silent_for: Duration,
 }
@@ -146,13 +136,13 @@ impl Engine {
     }
 
     fn batch_activity(&self, now: Instant, id: JobId, batch: &BatchInProgress) -> BatchActivity {
-        let held = self.workers.iter().filter_map(|(&worker_id, worker)| {
+        let shares = self.workers.iter().filter_map(|(&worker_id, worker)| {
             let ours = || worker.in_flight.values().filter(|assigned| assigned.job == id);
-            Some(HeldItems {
+            Some(WorkerShare {
                 worker: worker_id,
-                name: worker.name().to_owned(),
+                name: worker.name().to_string(),
                 n_items: ours().count(),
-                held_for: now.saturating_duration_since(ours().next()?.assigned),
+                oldest_for: now.saturating_duration_since(ours().next()?.assigned),
                 silent_for: now.saturating_duration_since(worker.last_heard),
             })
         });
@@ -163,7 +153,7 @@ impl Engine {
             n_items_queued: batch.n_waiting() - batch.audits.n_waiting(),
             n_audits_waiting: batch.audits.n_waiting(),
             n_individuals_failing: batch.n_individuals_failing(),
-            held: held.collect(),
+            shares: shares.collect(),
             running_for: batch.running_for(now),
         }
     }

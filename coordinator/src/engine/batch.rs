@@ -208,7 +208,7 @@ impl BatchInProgress {
 
     /// Takes back [`Self::hold`]; returns whether the item was held.
     pub fn release(&mut self, item: &Item) -> bool {
-        self.end_withholding(|held, until| held == item && until == Until::Answer).is_some()
+        self.end_withholding(|withheld, until| withheld == item && until == Until::Answer).is_some()
     }
 
     /// Withholds an item from all workers until a time.
@@ -299,8 +299,8 @@ impl BatchInProgress {
     }
 
     /// The name of the worker whose values for an item are known.
-    pub fn computed_by(&self, item: &Item) -> Option<&str> {
-        self.known.name(item.individual, item.trials.start).map(|name| &**name)
+    pub fn computed_by(&self, item: &Item) -> Option<&Arc<str>> {
+        self.known.name(item.individual, item.trials.start)
     }
 
     /// Records that an audit by a worker has agreed.
@@ -381,17 +381,17 @@ impl BatchInProgress {
     /// whether each is an audit.
     pub fn sanity_check(&self, in_flight: &BTreeMap<AssignmentId, (WorkerId, Item, bool)>) {
         self.known.sanity_check();
-        let mut held = BTreeMap::new();
+        let mut of_holders = BTreeMap::new();
         for (&individual, holders) in &self.holders {
             assert!(!holders.is_empty());
             for Holder { assignment_id, worker, item } in holders {
                 assert_eq!(item.individual, individual);
-                held.insert(*assignment_id, (*worker, item.clone(), false));
+                of_holders.insert(*assignment_id, (*worker, item.clone(), false));
             }
         }
         let (audits, others): (BTreeMap<_, _>, BTreeMap<_, _>) =
             in_flight.clone().into_iter().partition(|(_, (.., is_audit))| *is_audit);
-        assert_eq!(held, others);
+        assert_eq!(of_holders, others);
         assert!(audits.keys().eq(&self.audits.in_flight));
         for ((_, assignment_id), worker) in &self.uncovered {
             assert_eq!(in_flight[assignment_id].0, *worker);

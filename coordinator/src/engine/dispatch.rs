@@ -18,10 +18,11 @@ use crate::ids::{AssignmentId, JobId, WorkerId};
 use super::{
     Assignment, Engine,
     batch::BatchInProgress,
+    in_flight::{AssignedItem, ItemKind},
     item::Item,
     job::{CALL_OVERHEAD, JobWork, remaining},
     timeline::Fate,
-    worker::{AssignedItem, FULL_LOAD, Source, Worker},
+    worker::{FULL_LOAD, Worker},
 };
 
 /// Time lost by moving an item: a round trip, and the coordinator's own delays.
@@ -53,23 +54,23 @@ impl Engine {
     }
 
     pub(super) fn has_idle_slot(&self) -> bool {
-        self.load_index.available.first().is_some_and(|&(load, ..)| load < FULL_LOAD)
+        self.load_index.available.first().is_some_and(|&(rank, ..)| rank < FULL_LOAD)
     }
 
     fn hand_out_queued(&mut self, now: Instant) {
-        while let Some((job, worker, source)) = self.next_item() {
-            let Some(item) = self.take(job, worker, source) else { return };
+        while let Some((job, worker, kind)) = self.next_item() {
+            let Some(item) = self.take(job, worker, kind) else { return };
             let Some(work) = self.jobs.get_mut(&job) else { return };
             let charge = work.charge(item.trials.len(), self.workers[&worker].pace);
             self.ready_queue.charge(job, work, charge);
-            self.give(now, worker, job, item, source, charge);
+            self.give(now, worker, job, item, kind, charge);
         }
     }
 
-    /// The next item: its job, its queue, and the worker that gets it. While a job's next item
+    /// The next item: its job, the worker that gets it, and its kind. While a job's next item
     /// waits for a free slot, later jobs get only idle slots, all of them at workers that do not
     /// take the first job. If later jobs got items ahead, no slot would become free.
-    fn next_item(&self) -> Option<(JobId, WorkerId, Source)> {
+    fn next_item(&self) -> Option<(JobId, WorkerId, ItemKind)> {
         if self.load_index.available.is_empty() {
             return None;
         }
@@ -77,13 +78,13 @@ impl Engine {
         for id in self.ready_queue.iter() {
             let work = &self.jobs[&id];
             let Some(batch) = &work.batch else { continue };
-            let Some((load, first)) = self.takers(work).next() else { continue };
-            if let Some((worker, source)) = self.next_check(work, batch) {
-                return Some((id, worker, source));
+            let Some((rank, first)) = self.takers(work).next() else { continue };
+            if let Some((worker, kind)) = self.next_check(work, batch) {
+                return Some((id, worker, kind));
             }
             if !batch.queue.is_empty() {
-                if load < FULL_LOAD || (!is_awaited && self.hands_out_ahead(id)) {
-                    return Some((id, first, Source::Queue));
+                if rank < FULL_LOAD || (!is_awaited && self.hands_out_ahead(id)) {
+                    return Some((id, first, ItemKind::Ordinary));
                 }
                 if !self.has_idle_slot() {
                     return None;
@@ -95,11 +96,11 @@ impl Engine {
     }
 
     /// Takes the next item for a worker out of a queue.
-    fn take(&mut self, job: JobId, worker: WorkerId, source: Source) -> Option<Item> {
-        match source {
-            Source::Audits => self.take_audit(job, worker),
-            Source::Suspects => self.batch_mut(job)?.suspects.pop_front(usize::MAX),
-            Source::Queue => {
+    fn take(&mut self, job: JobId, worker: WorkerId, kind: ItemKind) -> Option<Item> {
+        match kind {
+            ItemKind::Audit => self.take_audit(job, worker),
+            ItemKind::Suspect => self.batch_mut(job)?.suspects.pop_front(usize::MAX),
+            ItemKind::Ordinary => {
                 let n_trials = self.n_trials_per_item(job, &self.workers[&worker]);
                 let is_short = self.is_short(job);
                 let batch = self.batch_mut(job)?;
@@ -115,7 +116,7 @@ impl Engine {
     /// The workers with credit that accept a job's items, the least loaded first, each with its
     /// rank.
     pub(super) fn takers(&self, work: &JobWork) -> impl Iterator<Item = (u64, WorkerId)> {
-        let available = self.load_index.available.iter().map(|&(load, _, id)| (load, id));
+        let available = self.load_index.available.iter().map(|&(rank, _, id)| (rank, id));
         available.filter(|(_, id)| self.workers[id].takes(work))
     }
 
@@ -166,8 +167,8 @@ impl Engine {
         let n_calls = (n_left / f64::from(batch.request.n_trials)).max(n_slots);
         let work = n_left + CALL_OVERHEAD * n_calls + LOST_PER_SLOT * n_slots;
         let share = worker.usable_speed() as f64 / self.load_index.usable_speed.max(1) as f64;
-        let held = &worker.in_flight;
-        work * share - held.n_trials() as f64 - CALL_OVERHEAD * (held.len() + 1) as f64
+        let in_flight = &worker.in_flight;
+        work * share - in_flight.n_trials() as f64 - CALL_OVERHEAD * (in_flight.len() + 1) as f64
     }
 
     /// Takes back the last item that waits at a worker behind others, and queues it. Returns
@@ -217,7 +218,7 @@ impl Engine {
                 let part = Item { individual: item.individual, trials };
                 let Some(worker) = other(self, &part) else { break };
                 start = part.trials.end;
-                self.give(now, worker, job, part, Source::Queue, Duration::ZERO);
+                self.give(now, worker, job, part, ItemKind::Ordinary, Duration::ZERO);
             }
         }
         true
@@ -229,7 +230,7 @@ impl Engine {
         work: &JobWork,
         is_suitable: impl Fn(WorkerId) -> bool,
     ) -> Option<WorkerId> {
-        let idle = self.takers(work).take_while(|&(load, _)| load < FULL_LOAD);
+        let idle = self.takers(work).take_while(|&(rank, _)| rank < FULL_LOAD);
         idle.map(|(_, id)| id).find(|&id| is_suitable(id))
     }
 
@@ -240,7 +241,7 @@ impl Engine {
         worker_id: WorkerId,
         job: JobId,
         item: Item,
-        source: Source,
+        kind: ItemKind,
         charge: Duration,
     ) {
         let Some(work) = self.jobs.get_mut(&job) else { return };
@@ -252,13 +253,13 @@ impl Engine {
         let Some(batch) = &mut work.batch else { return };
         self.counters.n_items_assigned += 1;
         let id = AssignmentId(self.counters.n_items_assigned);
-        if source == Source::Audits {
+        if kind == ItemKind::Audit {
             batch.audits.in_flight.insert(id);
         } else {
             batch.add_holder(id, worker_id, item.clone());
         }
         // A copy of a suspect might take another worker down.
-        if source == Source::Queue {
+        if kind == ItemKind::Ordinary {
             batch.uncovered.insert((expected, id), worker_id);
         }
         let request = &batch.request;
@@ -269,11 +270,10 @@ impl Engine {
             genotype: batch.genotype(item.individual),
             // Audits get genotypes instead of a distribution, so that they also compare the two
             // ways.
-            is_drawn: source != Source::Audits && request.distribution.is_some(),
+            is_drawn: kind != ItemKind::Audit && request.distribution.is_some(),
         };
         self.outgoing.assign(worker_id, job, request, assignment);
-        let assigned =
-            AssignedItem { job, trial_set, item, source, assigned: now, expected, charge };
+        let assigned = AssignedItem { job, trial_set, item, kind, assigned: now, expected, charge };
         self.update_worker(worker_id, |worker| worker.in_flight.insert(id, assigned));
     }
 

@@ -3,11 +3,51 @@
 use std::{
     collections::{BTreeMap, btree_map::IntoIter},
     ops::Deref,
+    time::{Duration, Instant},
 };
+
+use sim_core::TrialSet;
 
 use crate::ids::{AssignmentId, JobId};
 
-use super::worker::AssignedItem;
+use super::item::Item;
+
+/// Why a worker computes an item; each kind has a queue of its own in a batch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ItemKind {
+    /// It has no result.
+    Ordinary,
+    /// It has no result, and is a suspect; a worker has one such item at a time.
+    Suspect,
+    /// Only for comparison.
+    Audit,
+}
+
+/// An item that a worker has.
+#[derive(Debug, Clone)]
+pub struct AssignedItem {
+    /// Its job.
+    pub job: JobId,
+    /// The trial set of its batch.
+    pub trial_set: TrialSet,
+    /// The item.
+    pub item: Item,
+    /// Why the worker computes it.
+    pub kind: ItemKind,
+    /// When it was sent.
+    pub assigned: Instant,
+    /// When it should be done.
+    pub expected: Instant,
+    /// Time that its job was charged for it.
+    pub charge: Duration,
+}
+
+impl AssignedItem {
+    /// Whether it is computed only for comparison.
+    pub fn is_audit(&self) -> bool {
+        self.kind == ItemKind::Audit
+    }
+}
 
 /// Items by assignment, oldest first because ids grow, and the sum of their trials.
 #[derive(Debug, Default)]

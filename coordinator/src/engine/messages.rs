@@ -251,7 +251,7 @@ pub struct EvaluatedBatch {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Introduction {
     /// Its name.
-    pub name: String,
+    pub name: Arc<str>,
     /// Version of its software.
     pub version: String,
     /// Number of items that it computes at the same time.

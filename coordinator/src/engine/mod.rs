@@ -14,8 +14,8 @@
 //! | | queued | a batch is requested | `batch.rs` |
 //! | queued | assigned | it is a job's turn (`ready_queue.rs`), and a worker has room (`load_index.rs`) | `dispatch.rs` |
 //! | any but done | done | a worker returns values that contradict no others, late or not | `results.rs`, `known_results.rs` |
-//! | assigned | queued | its worker leaves, falls silent, is faulty or stalls (`stalls.rs`); its job is paused; or another worker is free | `results.rs` (`retry`, `requeue`), `dispatch.rs` |
-//! | assigned | delayed | two workers are lost with copies of it at the same time | `results.rs` (`retry`) |
+//! | assigned | queued | its worker leaves, falls silent, is faulty or stalls (`stalls.rs`); its job is paused; or another worker is free | `results.rs` (`on_no_result`, `requeue`), `dispatch.rs` |
+//! | assigned | delayed | two workers are lost with copies of it at the same time | `results.rs` (`on_no_result`) |
 //! | delayed | queued | the time is over | `results.rs` (`requeue_delayed`) |
 //! | any but done | held | a worker reports that it fails, or workers are lost while they compute it: the referee has to compute it | `trust/verdicts.rs` |
 //! | held | done, or queued | the referee has computed it, or could not | `trust/verdicts.rs` |
@@ -66,12 +66,11 @@ use crate::{
     priority::Priority,
 };
 
-pub use activity::{
-    BatchActivity, EvaluationActivity, HeldItems, JobActivity, OpenQuestion, WithheldWorker,
-};
+pub use activity::{BatchActivity, EvaluationActivity, JobActivity, WithheldWorker, WorkerShare};
 use availability::Obstacles;
 use batch::BatchInProgress;
 use fleet_time::FleetTime;
+use in_flight::AssignedItem;
 use job::JobWork;
 use load_index::WorkerLoadIndex;
 pub use messages::{
@@ -85,8 +84,9 @@ use results::NoResult;
 pub use stats::{Counters, FleetStats, JobStats};
 use timeline::Timeline;
 pub use timeline::{Fate, TimelineEntry};
+pub use trust::OpenQuestion;
 use trust::Trust;
-use worker::{AssignedItem, Worker};
+use worker::Worker;
 
 /// The configuration of an engine.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -380,7 +380,7 @@ impl Engine {
             self.forget_holder(assignment_id, &assignment);
             self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
             let why = if age_rank < n_suspects { lost } else { NoResult::TakenBack };
-            self.retry(now, assignment, why);
+            self.on_no_result(now, assignment, why);
         }
         self.finish_waived(now);
         n_items

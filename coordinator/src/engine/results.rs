@@ -12,10 +12,11 @@ use crate::ids::{AssignmentId, JobId, WorkerId};
 use super::{
     Command, Engine, ItemResult,
     batch::BatchInProgress,
+    in_flight::{AssignedItem, ItemKind},
     item::{Item, ItemState},
     timeline::Fate,
-    trust::{AfterLoss, Doubt},
-    worker::{AssignedItem, Source, Worker},
+    trust::{AfterLoss, Doubt, is_audited},
+    worker::Worker,
 };
 
 /// Why an assignment ended without a result.
@@ -159,7 +160,7 @@ impl Engine {
             return;
         }
         // The audited values may have been discarded meanwhile.
-        let n_new = self.take_values(now, job, id, item, values, is_late || is_audit);
+        let n_new = self.make_known(now, job, id, item, values, is_late || is_audit);
         if is_audit && n_new == 0 {
             let auditor = self.party(id).name;
             let Some(batch) = self.batch_mut(job) else { return };
@@ -174,9 +175,10 @@ impl Engine {
         self.finish_if_evaluated(now, job);
     }
 
-    /// Accepts the values of trials that have none; returns the number of these trials.
+    /// Makes the values of an item's trials known that have none, queues their audits, and
+    /// recalls copies that are no longer needed. Returns the number of these trials.
     /// `may_be_queued`: whether the item may wait for another worker.
-    pub(super) fn take_values(
+    pub(super) fn make_known(
         &mut self,
         now: Instant,
         job: JobId,
@@ -185,12 +187,12 @@ impl Engine {
         values: &[f64],
         may_be_queued: bool,
     ) -> usize {
-        let is_audited = self.is_audited(job, item);
         let Some(work) = self.jobs.get_mut(&job) else { return 0 };
         let Some(batch) = &mut work.batch else { return 0 };
         // The referee has no worker's name.
-        let name = self.workers.get(&id).map_or("", Worker::name);
-        let new = if is_audited {
+        let name = self.workers.get(&id).map_or("", |worker| worker.name());
+        let trial_set = batch.request.trial_set;
+        let new = if is_audited(self.config.audit_fraction, job, trial_set, item.individual) {
             batch.parts(item, |state| state != ItemState::Done)
         } else {
             Vec::new()
@@ -258,13 +260,14 @@ impl Engine {
         self.withdraw_questions(id, |question| matches!(question.doubt, Doubt::Losses));
     }
 
-    /// Queues an item again after an assignment without a result.
-    pub(super) fn retry(&mut self, now: Instant, assignment: AssignedItem, why: NoResult) {
-        let AssignedItem { job: id, item, source, .. } = assignment;
+    /// An assignment has ended without a result: its item is queued again, delayed, or left to
+    /// the referee.
+    pub(super) fn on_no_result(&mut self, now: Instant, assignment: AssignedItem, why: NoResult) {
+        let AssignedItem { job: id, item, kind, .. } = assignment;
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = &mut work.batch else { return };
         self.counters.n_items_requeued += 1;
-        if source == Source::Audits {
+        if kind == ItemKind::Audit {
             // The lost worker may have been the only possible auditor.
             batch.push_audit(&item);
             self.update_readiness(id);
@@ -326,7 +329,7 @@ impl Engine {
         for (holder, assignment_id) in holders {
             let worker: Option<&Worker> = self.workers.get(&holder);
             if let Some(assignment) = worker.and_then(|worker| worker.in_flight.get(&assignment_id))
-                && assignment.source != Source::Suspects
+                && assignment.kind != ItemKind::Suspect
             {
                 batch.uncovered.insert((assignment.expected, assignment_id), holder);
             }

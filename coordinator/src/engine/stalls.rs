@@ -57,9 +57,9 @@ impl Engine {
         let takes = work.expected(oldest.item.trials.len(), worker.pace)?;
         let first = work.batch.as_ref()?.computed_by(&oldest.item);
         let mut others = self.workers.iter().filter(|&(&other, _)| other != id);
-        let may_audit =
+        let is_auditor =
             |other: &Worker| other.is_usable() && other.takes(work) && Some(other.name()) != first;
-        let (times, more) = if oldest.is_audit() && !others.any(|(_, other)| may_audit(other)) {
+        let (times, more) = if oldest.is_audit() && !others.any(|(_, other)| is_auditor(other)) {
             PATIENCE_WITH_AUDITOR
         } else {
             PATIENCE
@@ -85,7 +85,7 @@ impl Engine {
                 self.recall(now, id, assignment_id)
             };
             if let Some(assignment) = assignment {
-                self.retry(now, assignment, NoResult::TakenBack);
+                self.on_no_result(now, assignment, NoResult::TakenBack);
             }
         }
         self.finish_waived(now);

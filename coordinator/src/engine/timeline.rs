@@ -12,11 +12,7 @@ use sim_core::TrialSet;
 
 use crate::ids::{JobId, WorkerId};
 
-use super::{
-    Engine,
-    batch::name_of,
-    worker::{AssignedItem, Worker},
-};
+use super::{Engine, batch::name_of, in_flight::AssignedItem, worker::Worker};
 
 /// Number of ended assignments to keep.
 const ENDED_MAX: usize = 2048;
@@ -94,7 +90,7 @@ impl Timeline {
         fate: Fate,
         busy: Duration,
     ) {
-        let name = Arc::clone(&worker.shared_name);
+        let name = Arc::clone(worker.name());
         let (list, n_max) = match fate {
             Fate::Failed | Fate::Lost => (&mut self.broken, BROKEN_MAX),
             _ => (&mut self.ended, ENDED_MAX),
@@ -125,13 +121,13 @@ impl Engine {
             .workers
             .iter()
             .flat_map(|(&id, worker)| {
-                let held = worker.in_flight.values().chain(worker.written_off.values());
-                held.map(move |item| (id, worker, item))
+                let items = worker.in_flight.values().chain(worker.written_off.values());
+                items.map(move |item| (id, worker, item))
             })
             .collect();
         unanswered.sort_by_key(|&(.., item)| item.assigned);
         let unanswered = unanswered.into_iter().take(UNANSWERED_MAX).map(|(id, worker, item)| {
-            let who = (id, &worker.shared_name);
+            let who = (id, worker.name());
             entry(now, who, item, Duration::ZERO, Duration::ZERO, Fate::Unanswered)
         });
         broken.iter().chain(ended).map(of_ended).chain(unanswered).collect()

@@ -15,8 +15,7 @@ use super::{
     Introduction, WorkerStatus,
     availability::{Availability, Obstacles},
     fleet_time::WorkerTime,
-    in_flight::InFlight,
-    item::Item,
+    in_flight::{AssignedItem, InFlight, ItemKind},
     job::JobWork,
 };
 
@@ -34,8 +33,6 @@ pub const SPEED_UNIT: u64 = 1 << 10;
 pub struct Worker {
     /// Its introduction.
     pub introduction: Introduction,
-    /// Its name, shared with records that outlive the connection.
-    pub shared_name: Arc<str>,
     /// Time of its last message.
     pub last_heard: Instant,
     /// The reasons why it gets no items.
@@ -60,49 +57,11 @@ pub struct Worker {
     n_learnt: u32,
 }
 
-/// The queue of a batch that an item comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
-    /// Items without a result.
-    Queue,
-    /// Items without a result that are suspects; a worker has one such item at a time.
-    Suspects,
-    /// Items to compute only for comparison.
-    Audits,
-}
-
-/// An item that a worker has.
-#[derive(Debug, Clone)]
-pub struct AssignedItem {
-    /// Its job.
-    pub job: JobId,
-    /// The trial set of its batch.
-    pub trial_set: TrialSet,
-    /// The item.
-    pub item: Item,
-    /// The queue that it comes from.
-    pub source: Source,
-    /// When it was sent.
-    pub assigned: Instant,
-    /// When it should be done.
-    pub expected: Instant,
-    /// Time that its job was charged for it.
-    pub charge: Duration,
-}
-
-impl AssignedItem {
-    /// Whether it is computed only for comparison.
-    pub fn is_audit(&self) -> bool {
-        self.source == Source::Audits
-    }
-}
-
 impl Worker {
     /// A worker without work.
     pub fn new(introduction: Introduction, now: Instant) -> Self {
         Self {
             time: WorkerTime::new(now, introduction.n_slots),
-            shared_name: introduction.name.as_str().into(),
             introduction,
             last_heard: now,
             obstacles: Obstacles::default(),
@@ -117,8 +76,8 @@ impl Worker {
         }
     }
 
-    /// Its name.
-    pub fn name(&self) -> &str {
+    /// Its name, shared with records that outlive the connection.
+    pub fn name(&self) -> &Arc<str> {
         &self.introduction.name
     }
 
@@ -134,7 +93,7 @@ impl Worker {
 
     /// Whether it has a suspect.
     pub fn has_suspect(&self) -> bool {
-        self.in_flight.values().any(|assigned| assigned.source == Source::Suspects)
+        self.in_flight.values().any(|assigned| assigned.kind == ItemKind::Suspect)
     }
 
     /// Most items it may hold: one per slot, and as many more as it computes in
@@ -154,22 +113,22 @@ impl Worker {
 
     /// Whether it may be given another item.
     pub fn has_credit(&self) -> bool {
-        self.is_usable() && self.n_held() < self.n_credits()
+        self.is_usable() && self.n_items() < self.n_credits()
     }
 
     /// Number of items in progress or waiting at the worker.
-    fn n_held(&self) -> usize {
+    fn n_items(&self) -> usize {
         self.in_flight.len() + self.written_off.len()
     }
 
     /// Number of items in flight that wait for a slot.
     pub fn n_waiting(&self) -> usize {
-        self.n_held().saturating_sub(self.n_slots()).min(self.in_flight.len())
+        self.n_items().saturating_sub(self.n_slots()).min(self.in_flight.len())
     }
 
     /// Items per slot, in units of 1 / [`FULL_LOAD`].
     pub fn load(&self) -> u64 {
-        (self.n_held() as u64 * FULL_LOAD) / self.n_slots() as u64
+        (self.n_items() as u64 * FULL_LOAD) / self.n_slots() as u64
     }
 
     /// Sort key: when it would finish one more item. Workers with idle slots come first, the
@@ -179,7 +138,7 @@ impl Worker {
         if load < FULL_LOAD {
             return load;
         }
-        let load_then = (self.n_held() + 1) as f64 / self.n_slots() as f64;
+        let load_then = (self.n_items() + 1) as f64 / self.n_slots() as f64;
         FULL_LOAD + (load_then * self.pace * FULL_LOAD as f64) as u64
     }
 
@@ -205,7 +164,7 @@ impl Worker {
 
     /// Number of usable slots without an item.
     pub fn n_idle_slots(&self) -> usize {
-        self.n_usable_slots().saturating_sub(self.n_held())
+        self.n_usable_slots().saturating_sub(self.n_items())
     }
 
     /// Learns from an item that took `busy` and was expected to take `expected`
@@ -243,7 +202,7 @@ impl Worker {
         let (results_per_s, idle_share) = self.time.recent(now);
         WorkerStatus {
             id,
-            name,
+            name: name.to_string(),
             version,
             n_slots,
             experiments,

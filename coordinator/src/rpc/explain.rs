@@ -61,14 +61,14 @@ fn round(activity: BatchActivity) -> Option<Round> {
         audits_waiting: activity.n_audits_waiting as u32,
         individuals_failing: activity.n_individuals_failing as u32,
         held: activity
-            .held
+            .shares
             .into_iter()
-            .map(|held| HeldItems {
-                worker_id: held.worker.0,
-                worker_name: held.name,
-                items: held.n_items as u32,
-                held_ms: ms(held.held_for),
-                silent_ms: ms(held.silent_for),
+            .map(|share| HeldItems {
+                worker_id: share.worker.0,
+                worker_name: share.name,
+                items: share.n_items as u32,
+                held_ms: ms(share.oldest_for),
+                silent_ms: ms(share.silent_for),
             })
             .collect(),
         running_ms: ms(activity.running_for),

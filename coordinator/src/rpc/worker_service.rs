@@ -100,7 +100,7 @@ impl WorkerService for Workers {
         let dropped = link.dropped.clone();
         let (reply, id) = oneshot::channel();
         let introduction = Introduction {
-            name: printable(&hello.name),
+            name: printable(&hello.name).into(),
             version: printable(&hello.version),
             n_slots,
             experiments: NamePattern::new(&printable(&hello.experiments)),

@@ -9,10 +9,7 @@ use sim_core::TrialSet;
 
 use crate::ids::{AssignmentId, JobId};
 
-use super::super::{Engine, item::Item};
-
-/// The names of workers with a result in doubt, each with its number of open questions.
-pub type Doubted = BTreeMap<Arc<str>, usize>;
+use super::super::item::Item;
 
 /// The audits of a batch.
 #[derive(Debug, Default)]
@@ -50,15 +47,15 @@ impl Audits {
 
     /// Whether a worker of this name may do an audit of values whose worker is not in doubt
     /// already.
-    pub fn has_clear_for(&self, name: &str, doubted: &Doubted) -> bool {
-        self.waiting.keys().any(|first| **first != *name && !doubted.contains_key(first))
+    pub fn has_clear_for(&self, name: &str, doubted: &BTreeSet<&str>) -> bool {
+        self.waiting.keys().any(|first| **first != *name && !doubted.contains(&**first))
     }
 
     /// Takes the first audit for a worker of this name. Leaves out audits of workers in doubt.
-    pub fn pop_for(&mut self, name: &str, doubted: &Doubted) -> Option<Item> {
+    pub fn pop_for(&mut self, name: &str, doubted: &BTreeSet<&str>) -> Option<Item> {
         let mut waiting = self.waiting.iter_mut();
         let (first, items) =
-            waiting.find(|(first, _)| ***first != *name && !doubted.contains_key(*first))?;
+            waiting.find(|(first, _)| ***first != *name && !doubted.contains(&***first))?;
         let item = items.pop_front();
         if items.is_empty() {
             let first = Arc::clone(first);
@@ -91,26 +88,23 @@ impl Audits {
     }
 }
 
-impl Engine {
-    /// Whether a second worker audits an item. Depends only on the place of the individual, so
-    /// that the choice does not depend on workers.
-    pub(in crate::engine) fn is_audited(&self, id: JobId, item: &Item) -> bool {
-        let Some(batch) = self.batch(id) else { return false };
-        let (kind, number) = match id {
-            JobId::Experiment(id) => (0, id.0),
-            JobId::Evaluation(id) => (1, id.0),
-        };
-        let (set, generation) = match batch.request.trial_set {
-            TrialSet::Generation(generation) => (0, generation),
-            TrialSet::Evaluation => (2, 0),
-            TrialSet::Judgement(generation) => (3, generation),
-            TrialSet::HeldOut { generation, block: 0 } => (1, generation),
-            TrialSet::HeldOut { generation, block } => (3 + u64::from(block), generation),
-        };
-        let place = [mix_in(number, kind), mix_in(generation, set), u64::from(item.individual)];
-        let hash = place.into_iter().fold(0, |hash, part| mix(hash ^ part));
-        (hash as f64) < self.config.audit_fraction * (1u128 << 64) as f64
-    }
+/// Whether a second worker audits a share of the individuals that includes this one. Depends only
+/// on the place of the individual, so that the choice does not depend on workers.
+pub fn is_audited(share: f64, job: JobId, trial_set: TrialSet, individual: u32) -> bool {
+    let (kind, number) = match job {
+        JobId::Experiment(id) => (0, id.0),
+        JobId::Evaluation(id) => (1, id.0),
+    };
+    let (set, generation) = match trial_set {
+        TrialSet::Generation(generation) => (0, generation),
+        TrialSet::Evaluation => (2, 0),
+        TrialSet::Judgement(generation) => (3, generation),
+        TrialSet::HeldOut { generation, block: 0 } => (1, generation),
+        TrialSet::HeldOut { generation, block } => (3 + u64::from(block), generation),
+    };
+    let place = [mix_in(number, kind), mix_in(generation, set), u64::from(individual)];
+    let hash = place.into_iter().fold(0, |hash, part| mix(hash ^ part));
+    (hash as f64) < share * (1u128 << 64) as f64
 }
 
 /// Mixes a kind into a number; kind 0 leaves the number as it is.

@@ -49,7 +49,7 @@ impl CrashLoops {
     pub fn on_result(&mut self, worker: &Worker) {
         // Checks the flag first, because this runs for every result and few workers have an entry.
         if worker.obstacles.is_on_probation {
-            self.by_name.remove(worker.name());
+            self.by_name.remove(&**worker.name());
         }
     }
 

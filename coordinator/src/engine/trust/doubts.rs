@@ -1,16 +1,16 @@
 //! Turns failures, losses and disagreements into questions for the referee.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use crate::ids::{JobId, WorkerId};
 
 use super::{
     super::{
         Engine,
+        in_flight::AssignedItem,
         item::Item,
         known_results::{Disagreement, REFEREE},
         results::NoResult,
-        worker::AssignedItem,
     },
     questions::{Doubt, Party, place, wrong},
 };
@@ -36,7 +36,7 @@ impl Engine {
         // A worker that is in doubt already adds no new question.
         let is_doubted = self.is_doubted(id);
         if assignment.is_audit() || is_doubted || self.batch(job).is_none() {
-            self.retry(now, assignment, NoResult::TakenBack);
+            self.on_no_result(now, assignment, NoResult::TakenBack);
         }
         if !is_doubted {
             self.ask_referee(job, item, Doubt::Failure { reporter, message });
@@ -88,6 +88,6 @@ impl Engine {
 
     /// A connected worker as the party of a question.
     pub(in crate::engine) fn party(&self, id: WorkerId) -> Party {
-        Party { id, name: self.workers[&id].name().into() }
+        Party { id, name: Arc::clone(self.workers[&id].name()) }
     }
 }

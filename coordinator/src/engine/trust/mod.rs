@@ -28,22 +28,16 @@ mod verdicts;
 use std::time::{Duration, Instant};
 
 use super::{
-    Engine,
-    batch::BatchInProgress,
-    item::Item,
-    job::JobWork,
-    worker::{Source, Worker},
+    Engine, batch::BatchInProgress, in_flight::ItemKind, item::Item, job::JobWork, worker::Worker,
 };
 use crate::ids::{JobId, WorkerId};
 
-use self::{
-    audits::Doubted, crash_loops::CrashLoops, quarantine::Quarantine, questions::Questions,
-};
+use self::{crash_loops::CrashLoops, quarantine::Quarantine, questions::Questions};
 
 pub use self::{
-    audits::Audits,
+    audits::{Audits, is_audited},
     losses::{AfterLoss, LossRecord},
-    questions::Doubt,
+    questions::{Doubt, OpenQuestion},
     unaudited::Unaudited,
 };
 
@@ -56,8 +50,6 @@ const AUDITOR_GRACE: Duration = Duration::from_secs(30);
 pub struct Trust {
     /// The questions for the referee.
     pub questions: Questions,
-    /// The workers that open questions concern.
-    doubted: Doubted,
     /// The workers that are proved faulty.
     pub quarantine: Quarantine,
     /// The workers that were lost, and have returned no result since.
@@ -71,7 +63,6 @@ impl Trust {
     pub fn new(now: Instant) -> Self {
         Self {
             questions: Questions::default(),
-            doubted: Doubted::new(),
             quarantine: Quarantine::default(),
             crash_loops: CrashLoops::default(),
             auditors_seen: now,
@@ -91,28 +82,27 @@ impl Engine {
         &self,
         work: &JobWork,
         batch: &BatchInProgress,
-    ) -> Option<(WorkerId, Source)> {
+    ) -> Option<(WorkerId, ItemKind)> {
         if !batch.audits.is_empty() {
             let mut takers = self.takers(work).map(|(_, id)| id);
-            let may = |id: &WorkerId| {
-                batch.audits.has_clear_for(self.workers[id].name(), &self.trust.doubted)
-            };
+            let doubted = self.trust.questions.doubted();
+            let may = |id: &WorkerId| batch.audits.has_clear_for(self.workers[id].name(), &doubted);
             if let Some(auditor) = takers.find(may) {
-                return Some((auditor, Source::Audits));
+                return Some((auditor, ItemKind::Audit));
             }
         }
         if batch.suspects.is_empty() {
             return None;
         }
         let taker = self.idle_taker(work, |id| !self.workers[&id].has_suspect())?;
-        Some((taker, Source::Suspects))
+        Some((taker, ItemKind::Suspect))
     }
 
     /// Takes the first audit that a worker may do.
     pub(super) fn take_audit(&mut self, job: JobId, worker: WorkerId) -> Option<Item> {
         let name = self.workers.get(&worker)?.name();
         let batch = self.jobs.get_mut(&job)?.batch.as_mut()?;
-        batch.audits.pop_for(name, &self.trust.doubted)
+        batch.audits.pop_for(name, &self.trust.questions.doubted())
     }
 
     /// Updates the last time at which two workers could audit each other.

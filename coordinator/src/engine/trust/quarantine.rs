@@ -53,7 +53,7 @@ impl Quarantine {
         let is_its = |(_, entry): &(&String, &Entry)| {
             entry.process.is_some() && entry.process == introduction.process
         };
-        let by_name = self.by_name.get_key_value(&introduction.name);
+        let by_name = self.by_name.get_key_value(&*introduction.name);
         by_name.or_else(|| self.by_name.iter().find(is_its))
     }
 

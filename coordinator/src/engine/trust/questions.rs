@@ -5,7 +5,7 @@
 //! wrong.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -17,7 +17,7 @@ use crate::{
     referee::RefereeRequest,
 };
 
-use super::super::{Command, OpenQuestion, batch::name_of, item::Item, known_results::same_bits};
+use super::super::{Command, batch::name_of, item::Item, known_results::same_bits};
 
 /// Number of processes that an item must take down before it is to blame. A single death may have
 /// another cause, such as a system that is short of memory.
@@ -77,6 +77,17 @@ pub struct Party {
     pub id: WorkerId,
     /// Its name.
     pub name: Arc<str>,
+}
+
+/// An item that the referee computes, or will.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenQuestion {
+    /// The item's individual.
+    pub individual: u32,
+    /// The doubt that the referee settles.
+    pub doubt: String,
+    /// Why the referee could not answer so far.
+    pub trouble: Option<String>,
 }
 
 impl Question {
@@ -215,6 +226,11 @@ impl Questions {
     /// Number of questions about a job with a reason that satisfies `is_reason`.
     pub fn n_about(&self, job: JobId, is_reason: impl Fn(&Doubt) -> bool) -> usize {
         self.about(job).filter(|(_, question)| is_reason(&question.doubt)).count()
+    }
+
+    /// The names of the workers with a result in doubt.
+    pub fn doubted(&self) -> BTreeSet<&str> {
+        self.open.values().flat_map(Question::parties).map(|party| &*party.name).collect()
     }
 
     /// Number of questions since the engine began.

@@ -69,9 +69,6 @@ impl Engine {
             Doubt::Failure { .. } | Doubt::Losses if batch.is_known(&item) => {}
             Doubt::Failure { .. } | Doubt::Losses => batch.hold(item),
         }
-        for party in question.parties() {
-            *self.trust.doubted.entry(Arc::clone(&party.name)).or_default() += 1;
-        }
         let parties: Vec<WorkerId> = question.parties().iter().map(|party| party.id).collect();
         let (id, command) = self.trust.questions.ask(question);
         for party in parties {
@@ -170,7 +167,7 @@ impl Engine {
             self.put_in_quarantine(now, &party, &reason);
         }
         if self.batch(job).is_some_and(|batch| batch.n_values(item.trials.len()) == values.len()) {
-            self.take_values(now, job, REFEREE, item, values, true);
+            self.make_known(now, job, REFEREE, item, values, true);
         }
         self.update_readiness(job);
         self.finish_if_evaluated(now, job);
@@ -184,12 +181,6 @@ impl Engine {
     /// Ends the doubt about the workers of a question.
     fn end_doubt(&mut self, id: QuestionId, question: &Question) {
         for party in question.parties() {
-            if let Some(n_questions) = self.trust.doubted.get_mut(&party.name) {
-                *n_questions -= 1;
-                if *n_questions == 0 {
-                    self.trust.doubted.remove(&party.name);
-                }
-            }
             let worker = self.workers.get(&party.id);
             if worker.is_some_and(|worker| worker.obstacles.question == Some(id)) {
                 self.update_worker(party.id, |worker| worker.obstacles.question = None);
@@ -253,7 +244,7 @@ impl Engine {
         }
         for assignment_id in in_flight.into_iter().rev() {
             if let Some(assignment) = self.recall(now, id, assignment_id) {
-                self.retry(now, assignment, NoResult::TakenBack);
+                self.on_no_result(now, assignment, NoResult::TakenBack);
             }
         }
         self.update_worker(id, |worker| worker.recalled.clear());

@@ -181,9 +181,9 @@ fn activity_names_the_items_of_each_worker_with_their_age() {
     assert_eq!(activity.rivals, [other]);
     let batch = activity.batch.unwrap();
     assert_eq!(batch.running_for, 4 * SECOND);
-    let [held] = &batch.held[..] else { panic!("{batch:?}") };
-    assert_eq!(batch.n_items_queued + held.n_items, 4);
-    assert_eq!((held.worker, held.held_for), (worker, 4 * SECOND), "the oldest counts");
+    let [share] = &batch.shares[..] else { panic!("{batch:?}") };
+    assert_eq!(batch.n_items_queued + share.n_items, 4);
+    assert_eq!((share.worker, share.oldest_for), (worker, 4 * SECOND), "the oldest counts");
     assert_eq!(fleet.activity(JobId::Experiment(ExperimentId(9))).batch, None);
 }
 

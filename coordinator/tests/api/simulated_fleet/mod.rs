@@ -262,7 +262,7 @@ impl SimulatedFleet {
     fn introduction(&mut self, n_slots: usize) -> Introduction {
         self.n_processes += 1;
         Introduction {
-            name: format!("worker-{}", self.n_processes),
+            name: format!("worker-{}", self.n_processes).into(),
             version: "simulated".to_owned(),
             n_slots,
             experiments: NamePattern::default(),
