@@ -1,14 +1,15 @@
 //! Numbers with the same bits on every machine.
 //!
 //! - [`random`]: random streams, each addressed by its purpose;
-//! - [`Isa`]: the vector instructions of a computation, which change its speed and no bit.
+//! - [`Isa`]: the vector instructions of a computation. They change its speed, but no bit of its
+//!   results.
 //!
 //! A stream's values depend on its address alone, not on the reader or the time of reading:
 //!
 //! ```
 //! use determinism::random::{Purpose, Stream};
 //!
-//! // Seed 7, generation 1, trial 2, what it is for, robot 3.
+//! // Seed 7, generation 1, trial 2, purpose, robot 3.
 //! let mut stream = Stream::new(7, 1_u64, 2, Purpose::Reception, 3);
 //! assert_eq!(stream.uniform(), 0.20192406347197278);
 //!

@@ -1,10 +1,10 @@
 //! Random streams, each addressed by its purpose.
 //!
-//! A stream is ChaCha8 whose 256-bit key *is* its address, four little-endian 64-bit words
-//! `[seed, trial set, trial, purpose]`, and whose 64-bit stream number is the robot. A trial set
-//! ([`TrialSet`]) is the word g for generation g, g | 2^63 for its held-out trials, and 2^62 for
-//! evaluations. Streams of different addresses are independent, and no stream depends on other
-//! readers or on time. Any other program with a ChaCha8 can reproduce every number of a run.
+//! A stream is a ChaCha8 generator. Its 256-bit key is the address: four little-endian 64-bit
+//! words, `[seed, trial set, trial, purpose]`. Its 64-bit stream number is the robot's number. A
+//! trial set ([`TrialSet`]) is the word g for generation g, g | 2^63 for its held-out trials, and
+//! 2^62 for evaluations. Streams of different addresses are independent, and no stream depends on
+//! other readers or on time. Any program with ChaCha8 can reproduce every number of a run.
 //!
 //! The index of an individual is not part of an address: individuals of a
 //! generation meet the same worlds and the same noise (common random numbers).
@@ -14,8 +14,8 @@
 //! - uniform in \[0, 1): `(u64 >> 11) * 2^-53`;
 //! - an integer below n: `floor(uniform * n)`;
 //! - standard normal: the quantile function (Wichura 1988, AS 241, PPND16) of `(k + 0.5) * 2^-52`
-//!   with `k = u64 >> 12`. One draw gives one normal, so draws stay countable. The logarithm
-//!   comes from `libm`; crates for distributions would use the platform's as soon as any
+//!   with `k = u64 >> 12`. One draw gives one normal, so draws stay countable. The logarithm comes
+//!   from `libm`. Crates for distributions would use the platform's logarithm as soon as a
 //!   dependency enables their `std` feature.
 
 use std::fmt;
@@ -38,24 +38,24 @@ pub enum Purpose {
     /// Robots affected by a perturbation; stream = its place in
     /// `PerturbationsConfig` of the experiment file.
     Perturbation = 3,
-    /// Choice of a receiver among valid frames; stream = robot, one draw per step.
+    /// A receiver's choice among valid frames; stream = robot, one draw per step.
     Reception = 4,
     /// Choice of the symbol of a message; stream = robot, one draw per step.
     Quantisation = 5,
     /// Stochastic decoding; stream = robot, per step one draw per stochastic
     /// output neuron (threshold) or output (softmax), in the order of outputs.
     Decoding = 6,
-    /// Sensor noise; stream = robot + 2^32 k, one normal per value of the reading
-    /// and step. k is 0 for the light sensor and, after it, the distance sensor,
-    /// and another number for each other kind of sensor.
+    /// Sensor noise; stream = robot + 2^32 k, one normal per value of the reading and step. Every
+    /// kind of sensor has its own k, except that the light sensor and the distance sensor draw from
+    /// k = 0, in this order.
     SensorNoise = 7,
     /// Movement of lights; stream = light.
     LightMovement = 8,
     /// Choice of the synapses that exist; seed = `topology.seed`, stream = index of the group.
-    /// Delays, of neurons and then of nodes of encoders; stream = 2^32.
+    /// Stream 2^32 gives delays, first of neurons and then of nodes of encoders.
     Connections = 9,
-    /// Weights outside the genotype; as [`Connections`](Self::Connections). Weights of
-    /// decoders; stream = 2^32 + output.
+    /// Weights outside the genotype, with the seed and stream of
+    /// [`Connections`](Self::Connections). Weights of decoders use stream 2^32 + output.
     FixedWeights = 10,
     /// Draws of a task's script; stream = 0.
     Script = 12,
@@ -75,7 +75,7 @@ pub enum Purpose {
 /// than trial t of any other set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum TrialSet {
-    /// The trials that select in generation g of an evolution, g from 0.
+    /// The trials by which evolution selects in generation g, from 0.
     Generation(u64),
     /// The held-out trials that compare candidates after generation g: worlds and noise that
     /// evolution never meets.
@@ -85,10 +85,9 @@ pub enum TrialSet {
         /// Index of the block, from 0; candidates that are close meet several blocks.
         block: u8,
     },
-    /// The trials that judge the champion after generation g, the last one: they
-    /// select nothing.
+    /// The trials that judge the champion after the last generation, g. They select nothing.
     Judgement(u64),
-    /// The trials of evaluations: the same for every run and of no generation.
+    /// The trials of evaluations, which are the same for every run and belong to no generation.
     Evaluation,
 }
 
@@ -191,8 +190,8 @@ impl Stream {
 
     /// Uniform in 0..n. `n` must not be 0.
     pub fn below(&mut self, n: usize) -> usize {
-        debug_assert!(n > 0, "no integer is below 0");
-        // The product can round up to n for huge n only; min keeps the promise.
+        debug_assert!(n > 0, "`n` is at least 1");
+        // For huge n, the product can round up to n; `min` keeps it below.
         ((self.uniform() * n as f64) as usize).min(n - 1)
     }
 
@@ -218,16 +217,16 @@ impl Stream {
         standard_normal_quantile(self.probability())
     }
 
-    /// Fills `values` with the draws of repeated calls of [`normal`](Self::normal), to the bit,
-    /// in less than half the time.
+    /// Fills `values` with the same bits as repeated calls of [`normal`](Self::normal), in less
+    /// than half the time.
     pub fn fill_normal(&mut self, values: &mut [f64]) {
         self.fill_probability(values);
         standard_normal_quantiles(values);
     }
 
-    /// Fills `values` with uniform numbers in (0, 1); [`standard_normal_quantiles`] turns them
-    /// into the draws of [`fill_normal`](Self::fill_normal). For callers that draw few numbers
-    /// each from many streams.
+    /// Fills `values` with uniform numbers in (0, 1); [`standard_normal_quantiles`] turns them into
+    /// the draws of [`fill_normal`](Self::fill_normal). It is meant for callers that draw a few
+    /// numbers from each of many streams.
     pub fn fill_probability(&mut self, values: &mut [f64]) {
         values.fill_with(|| self.probability());
     }
@@ -292,8 +291,8 @@ fn central_quantile(q: f64) -> f64 {
     q * horner(&CENTRE_NUMERATOR, r) / horner(&CENTRE_DENOMINATOR, r)
 }
 
-/// Replaces probabilities by their quantiles. First it treats all of them as central: without
-/// branches, the compiler vectorises the loop.
+/// Replaces probabilities by their quantiles. It first treats all of them as central, because the
+/// compiler vectorises a loop without branches.
 struct StandardNormalQuantiles<'a>(&'a mut [f64]);
 
 impl WithSimd for StandardNormalQuantiles<'_> {
@@ -401,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn many_normals_at_once_are_those_drawn_one_by_one() {
+    fn many_normals_at_once_have_the_bits_of_single_draws() {
         for n in [0, 1, 63, 64, 65, 10_000] {
             let stream = Stream::new(n, 1, 0, Purpose::Evolution, 2);
             let mut one_by_one = stream.clone();
@@ -415,7 +414,7 @@ mod tests {
             }
             let mut at_once = stream;
             at_once.fill_normal(&mut vec![0.0; n as usize]);
-            assert_eq!(at_once.uniform(), one_by_one.uniform(), "as many draws");
+            assert_eq!(at_once.uniform(), one_by_one.uniform(), "the number of draws is the same");
         }
     }
 
@@ -446,7 +445,7 @@ mod tests {
 
     /// These words are part of the format of a run, as are the numbers of purposes.
     #[test]
-    fn trial_sets_have_their_words() {
+    fn the_words_of_trial_sets_are_fixed() {
         for (trial_set, word) in [
             (TrialSet::Generation(0), 0),
             (TrialSet::Generation(39), 39),
@@ -461,7 +460,7 @@ mod tests {
     }
 
     #[test]
-    fn values_have_their_moments() {
+    fn values_have_the_moments_of_their_distribution() {
         let mut stream = Stream::new(0, 0, 0, Purpose::Evolution, 0);
         let n = 100_000;
         let normals: Vec<f64> = (0..n).map(|_| stream.normal()).collect();
@@ -477,7 +476,7 @@ mod tests {
         }
     }
 
-    /// Minted with the first version of the format: changing it changes every run.
+    /// The first version of the format fixed these values. A change of them changes every run.
     #[test]
     fn first_values_of_a_stream_are_fixed() {
         let mut stream = Stream::new(7, 1, 2, Purpose::Reception, 3);

@@ -39,7 +39,7 @@ pub fn interval_of_two(
     resample([first, second], statistic)
 }
 
-/// An empty sample is one that the statistic ignores.
+/// Resamples both samples. Statistics of one sample ignore the second one, which is empty.
 fn resample(
     [first, second]: [&[f64]; 2],
     statistic: impl Fn(&mut [f64], &mut [f64]) -> f64,

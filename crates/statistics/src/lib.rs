@@ -8,7 +8,7 @@ mod ranks;
 pub use bootstrap::{Interval, interval, interval_of_two};
 pub use ranks::{mann_whitney, probability_of_improvement};
 
-/// The median; the mean of the two middle values of an even number. NaN without values.
+/// The median; of an even number of values, the mean of the two middle values. NaN without values.
 pub fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     quantile(values, 0.5)

@@ -5,8 +5,8 @@ use std::f64::consts::SQRT_2;
 /// Largest size of the smaller sample for an exact p-value, if no values are equal.
 const EXACT_MAX: usize = 8;
 
-/// The probability, in \[0, 1\], that a value of `a` is larger than one of `b`; equal values
-/// count half. This is A of Vargha & Delaney 2000. NaN if a sample is empty.
+/// The probability, in \[0, 1\], that a value of `a` is larger than one of `b`; equal values count
+/// half. Vargha & Delaney (2000) call it A. NaN if a sample is empty.
 pub fn probability_of_improvement(a: &[f64], b: &[f64]) -> f64 {
     statistic(a, b) / (a.len() * b.len()) as f64
 }
@@ -30,7 +30,8 @@ pub fn mann_whitney(a: &[f64], b: &[f64]) -> Option<f64> {
     Some(p.min(1.0))
 }
 
-/// U: the pairs in which the value of `a` is larger, and half of those that are equal.
+/// U: the number of pairs in which the value of `a` is larger, and half the number of pairs of
+/// equal values.
 fn statistic(a: &[f64], b: &[f64]) -> f64 {
     let wins = |x: &f64| -> f64 {
         b.iter().map(|y| f64::from(u8::from(x > y)) + 0.5 * f64::from(u8::from(x == y))).sum()
@@ -46,8 +47,9 @@ fn ties(a: &[f64], b: &[f64]) -> Vec<f64> {
     groups.filter(|&n| n > 1.0).collect()
 }
 
-/// Twice the probability of a U of at least `u`, as a share of the ways to choose `n` of `n + m`
-/// ranks. `ways[k][s]`: the number of ways to choose k ranks whose sum is s above the smallest.
+/// Twice the probability of a U of at least `u`: twice the share of the ways to choose `n` of `n +
+/// m` ranks that give such a U. `ways[k][s]`: the number of ways to choose k ranks whose sum is s
+/// above the smallest.
 fn exact(u: usize, n: usize, m: usize) -> f64 {
     let mut ways = vec![vec![0.0; n * m + 1]; n + 1];
     ways[0][0] = 1.0;

@@ -38,15 +38,15 @@ fn close(found: f64, expected: f64, tolerance: f64) -> bool {
     (found - expected).abs() <= tolerance * expected.abs().max(1e-12)
 }
 
-/// Whether both ends agree, up to the difference of two sets of random draws: a part of the
-/// width, or, for a statistic with few possible values, a step between two of them.
+/// Whether both ends agree, up to the effect of different random draws: a part of the width, or one
+/// step between the possible values of a statistic that has few.
 fn agree(found: Interval, expected: [f64; 2], part: f64) -> bool {
     let width = (expected[1] - expected[0]).abs().max(1e-12);
     found.ci95.unwrap().iter().zip(expected).all(|(found, end)| (found - end).abs() <= part * width)
 }
 
 #[test]
-fn summaries_are_those_of_rliable() {
+fn summaries_agree_with_rliable() {
     for of in fixture().summaries {
         let iqm = interval(&of.values, interquartile_mean);
         let middle = interval(&of.values, median);
@@ -58,7 +58,7 @@ fn summaries_are_those_of_rliable() {
 }
 
 #[test]
-fn comparisons_are_those_of_rliable_and_scipy() {
+fn comparisons_agree_with_rliable_and_scipy() {
     for pair in fixture().pairs {
         let found = interval_of_two(&pair.a, &pair.b, |a, b| probability_of_improvement(a, b));
         assert!(close(found.value, pair.probability, 1e-12), "{pair:?} {found:?}");
@@ -70,7 +70,7 @@ fn comparisons_are_those_of_rliable_and_scipy() {
 }
 
 #[test]
-fn what_never_happened_has_no_interval_of_numbers() {
+fn events_that_never_happened_give_infinite_medians_and_ends() {
     let never = f64::INFINITY;
     let found = interval(&[3.0, 5.0, never], median);
     assert_eq!((found.value, found.ci95), (5.0, Some([3.0, never])));
@@ -79,7 +79,7 @@ fn what_never_happened_has_no_interval_of_numbers() {
 }
 
 #[test]
-fn one_run_or_two_say_nothing_of_the_spread_and_none_say_nothing() {
+fn one_or_two_runs_have_no_interval_and_no_runs_have_no_value() {
     assert_eq!(interval(&[2.0], median), Interval { value: 2.0, ci95: None });
     assert_eq!(interval(&[2.0, 4.0], median).ci95, None);
     let better = |few: &[f64]| {
@@ -93,7 +93,7 @@ fn one_run_or_two_say_nothing_of_the_spread_and_none_say_nothing() {
 }
 
 #[test]
-fn values_of_every_size_have_summaries_of_numbers() {
+fn huge_and_tiny_values_have_finite_summaries() {
     for values in [[f64::MIN, f64::MAX, f64::MAX, 1e308], [5e-324, 1e-323, 0.0, -5e-324]] {
         for found in [interval(&values, median), interval(&values, interquartile_mean)] {
             let [low, high] = found.ci95.unwrap();
