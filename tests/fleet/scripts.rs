@@ -120,7 +120,7 @@ fn mistakes_in_a_script_are_reported_before_anything_is_computed() {
     let experiment = scripted(3, script);
     let path = experiment.path();
     let validated = swarmctl(["validate", path.to_str().unwrap()]);
-    let expected = "task.script: task.star:2: nothing has a `robos`; did you mean `robots`?";
+    let expected = "task.script: task.star:2: no object has a `robos`; did you mean `robots`?";
     assert!(validated.stderr.contains(expected), "{}", validated.stderr);
     assert_eq!(validated.code, Some(2));
     // The script fails in an early step.

@@ -131,10 +131,13 @@ fn contains(container: &Value, value: &Value, meter: &Rc<Meter>) -> Outcome<bool
             meter.work(text.len())?;
             match value.as_text() {
                 Some(part) if part.len() <= 64 => Ok(text.contains(part)),
-                _ => Err("only a string of at most 64 bytes can be searched in a string".into()),
+                _ => Err("`in` finds only strings of at most 64 bytes in a string".into()),
             }
         }
-        _ => Err(format!("`in` needs a list, dict or string, not a {}", container.kind()).into()),
+        _ => {
+            Err(format!("`in` needs a list, dict or string, not {}", container.kind_with_article())
+                .into())
+        }
     }
 }
 
@@ -158,8 +161,10 @@ pub(crate) fn order(a: &Value, b: &Value, meter: &Meter) -> Outcome<Ordering> {
 /// The error for two values without an order.
 pub(crate) fn without_order(a: &Value, b: &Value) -> Fault {
     match (a.number(), b.number()) {
-        (Some(_), Some(_)) => "not a number (NaN) has no order".into(),
-        _ => format!("a {} and a {} have no order", a.kind(), b.kind()).into(),
+        (Some(_), Some(_)) => "NaN (not a number) has no order".into(),
+        _ => {
+            format!("{} and {} have no order", a.kind_with_article(), b.kind_with_article()).into()
+        }
     }
 }
 
@@ -182,7 +187,11 @@ pub(crate) fn place(index: &Value, n: usize) -> Outcome<usize> {
     let index = match index {
         Value::Int(index) => *index,
         Value::Float(index) if index.fract() == 0.0 && index.abs() < 1e9 => *index as i64,
-        _ => return Err(format!("an index is a whole number, not a {}", index.kind()).into()),
+        _ => {
+            return Err(
+                format!("an index is a whole number, not {}", index.kind_with_article()).into()
+            );
+        }
     };
     let from_start = if index < 0 { index.saturating_add(n as i64) } else { index };
     usize::try_from(from_start)
@@ -196,19 +205,19 @@ pub(crate) fn element(container: &Value, index: &Value) -> Outcome<Value> {
     match container {
         Value::List(list) => {
             let place = place(index, list.len())?;
-            Ok(list.get(place).expect("its place is below its length"))
+            Ok(list.get(place).expect("the place is below the length"))
         }
         Value::Dict(dict) => dict.get(&Key::new(index)?)?.ok_or_else(|| {
             format!("the dict has no key {}", shortened(&format!("{index:?}"))).into()
         }),
-        _ => Err(format!("a {} has no elements", container.kind()).into()),
+        _ => Err(format!("{} has no elements", container.kind_with_article()).into()),
     }
 }
 
 /// `list[from:to]`.
 pub(crate) fn slice(value: &Value, from: &Value, to: &Value, meter: &Rc<Meter>) -> Outcome<Value> {
     let Value::List(list) = value else {
-        return Err(format!("a {} has no parts", value.kind()).into());
+        return Err(format!("{} cannot be sliced", value.kind_with_article()).into());
     };
     let n = list.len();
     let bound = |bound: &Value, default: usize| match bound {
@@ -217,7 +226,10 @@ pub(crate) fn slice(value: &Value, from: &Value, to: &Value, meter: &Rc<Meter>) 
             Ok(usize::try_from(index.saturating_add(n as i64)).unwrap_or(0))
         }
         Value::Int(index) => Ok(usize::try_from(*index).unwrap_or(n).min(n)),
-        _ => Err(Fault::from(format!("an index is a whole number, not a {}", bound.kind()))),
+        _ => Err(Fault::from(format!(
+            "an index is a whole number, not {}",
+            bound.kind_with_article()
+        ))),
     };
     let (from, to) = (bound(from, 0)?, bound(to, n)?);
     let items = list.items()?;
@@ -236,7 +248,7 @@ pub(crate) fn method(
     match value {
         Value::List(list) => list_method(list, method, arguments, meter),
         Value::Dict(dict) => dict_method(dict, method, arguments, meter),
-        _ => Err(format!("a {} has no `{}`", value.kind(), method.name()).into()),
+        _ => Err(format!("{} has no `{}`", value.kind_with_article(), method.name()).into()),
     }
 }
 
@@ -299,7 +311,7 @@ fn dict_method(
             let mut items = Vec::new();
             for key in dict.keys()? {
                 meter.work(1)?;
-                let value = dict.get(&key)?.expect("it is one of its keys");
+                let value = dict.get(&key)?.expect("the dict has this key");
                 items.push(match method {
                     Method::Values => value,
                     _ => Value::tuple(vec![key.value(meter)?, value], meter)?,
@@ -381,7 +393,9 @@ pub(crate) fn builtin(function: Builtin, arguments: &[Value], meter: &Rc<Meter>)
             let mut sum = Value::Int(0);
             for value in elements(list, meter)? {
                 if value.number().is_none() {
-                    return Err(format!("`sum` adds numbers, not a {}", value.kind()).into());
+                    return Err(
+                        format!("`sum` adds numbers, not {}", value.kind_with_article()).into()
+                    );
                 }
                 sum = binary(Binary::Add, &sum, &value, meter)?;
             }
@@ -407,17 +421,19 @@ pub(crate) fn builtin(function: Builtin, arguments: &[Value], meter: &Rc<Meter>)
         (Builtin::Sin, [x]) => Value::Float(libm::sin(number(name, x)?)),
         (Builtin::Sqrt, [x]) => Value::Float(number(name, x)?.sqrt()),
         (Builtin::Tan, [x]) => Value::Float(libm::tan(number(name, x)?)),
-        (Builtin::Len, [other]) => return Err(format!("a {} has no length", other.kind()).into()),
+        (Builtin::Len, [other]) => {
+            return Err(format!("{} has no length", other.kind_with_article()).into());
+        }
         _ => return Err(wrong_arguments(name, arguments)),
     })
 }
 
 fn number(function: &str, value: &Value) -> Outcome<f64> {
-    let wrong = || format!("`{function}` takes a number, not a {}", value.kind()).into();
+    let wrong = || format!("`{function}` takes a number, not {}", value.kind_with_article()).into();
     value.number().ok_or_else(wrong)
 }
 
-/// A float without a fraction as a whole number.
+/// Converts a float without a fraction to a whole number.
 fn whole(value: f64) -> Outcome<Value> {
     const LARGEST: f64 = (1_i64 << 62) as f64;
     if value.abs() <= LARGEST {

@@ -36,7 +36,7 @@ pub(crate) enum Op {
     Binary(Binary, Box<(Expr, Expr)>),
     And(Box<(Expr, Expr)>),
     Or(Box<(Expr, Expr)>),
-    /// Condition, value if it holds, value if not.
+    /// Condition, value if true, value if false.
     If(Box<(Expr, Expr, Expr)>),
     Attribute(Box<Expr>, Name),
     Index(Box<(Expr, Expr)>),
@@ -107,17 +107,17 @@ pub(crate) enum Target {
     Attribute(Box<Expr>, Name),
 }
 
-/// A list in the order of keys.
+/// A request to order a list by keys.
 #[derive(Debug)]
 pub(crate) struct Order {
     pub(crate) which: Which,
     pub(crate) list: Expr,
     pub(crate) key: Option<ElementKey>,
-    /// The largest first.
+    /// Whether the largest element comes first.
     pub(crate) reverse: Option<Expr>,
 }
 
-/// The requested part of the order.
+/// The requested elements of the order: the first, the last or all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Which {
     First,

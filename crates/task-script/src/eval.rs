@@ -79,7 +79,7 @@ impl Machine<'_> {
         self.begin()?;
         self.meter.spend(function.n_locals)?;
         if self.n_calls == CALLS {
-            return Err(format!("more than {CALLS} calls within each other").into());
+            return Err(format!("more than {CALLS} nested calls").into());
         }
         let base = self.stack.len();
         push_arguments(self.stack)?;
@@ -107,7 +107,7 @@ impl Machine<'_> {
     /// Asks the host whether to continue.
     fn ask(&mut self) -> Result<(), String> {
         self.meter.ask_later();
-        if self.host.goes_on() { Ok(()) } else { Err("was stopped".into()) }
+        if self.host.goes_on() { Ok(()) } else { Err("the script was stopped".into()) }
     }
 
     fn block(&mut self, block: &[Stmt]) -> Outcome<Flow> {
@@ -198,7 +198,7 @@ impl Machine<'_> {
 
     fn set_attribute(&mut self, thing: &Value, name: u16, value: Value) -> Outcome<()> {
         let Value::Object(object) = thing else {
-            let message = format!("a {} has no attributes", thing.kind());
+            let message = format!("{} has no attributes", thing.kind_with_article());
             return Err(message.into());
         };
         Ok(self.host.set(*object, name, value)?)
@@ -213,7 +213,7 @@ impl Machine<'_> {
                     Target::Local(slot) => self.stack[self.base + slot].clone(),
                     _ => None,
                 };
-                let old = old.ok_or("a variable is changed that has no value yet")?;
+                let old = old.ok_or("this variable has no value yet")?;
                 let new = builtins::binary(operator, &old, &self.eval(expr)?, meter)?;
                 self.assign(target, new)
             }
@@ -236,7 +236,7 @@ impl Machine<'_> {
 
     fn attribute(&mut self, thing: &Value, name: u16) -> Outcome<Value> {
         let Value::Object(object) = thing else {
-            let message = format!("a {} has no attributes", thing.kind());
+            let message = format!("{} has no attributes", thing.kind_with_article());
             return Err(message.into());
         };
         Ok(self.host.get(*object, name, self.meter)?)
@@ -256,7 +256,7 @@ impl Machine<'_> {
         Ok(match op {
             Op::Local(slot) => {
                 let value = self.stack[self.base + slot].clone();
-                value.ok_or("a variable is read that has no value yet")?
+                value.ok_or("this variable has no value yet")?
             }
             Op::Float(value) => Value::Float(*value),
             Op::Int(value) => Value::Int(*value),
@@ -288,11 +288,19 @@ impl Machine<'_> {
                     Some(value) => Value::Int(value),
                     None => Value::Float(-(value as f64)),
                 },
-                other => return Err(format!("`-` takes a number, not a {}", other.kind()).into()),
+                other => {
+                    return Err(
+                        format!("`-` takes a number, not {}", other.kind_with_article()).into()
+                    );
+                }
             },
             Op::Positive(operand) => match self.eval(operand)? {
                 value @ (Value::Float(_) | Value::Int(_)) => value,
-                other => return Err(format!("`+` takes a number, not a {}", other.kind()).into()),
+                other => {
+                    return Err(
+                        format!("`+` takes a number, not {}", other.kind_with_article()).into()
+                    );
+                }
             },
             Op::Index(parts) => {
                 let container = self.eval(&parts.0)?;
@@ -330,14 +338,18 @@ impl Machine<'_> {
                         self.host.call(*object, name, &values, meter)?
                     }
                     (_, _, Some(method)) => builtins::method(&thing, method, &values, meter)?,
-                    _ => return Err(format!("a {} has no such method", thing.kind()).into()),
+                    _ => {
+                        return Err(
+                            format!("{} has no such method", thing.kind_with_article()).into()
+                        );
+                    }
                 }
             }
             Op::Nothing => Value::Nothing,
             Op::Bool(value) => Value::Bool(*value),
             Op::Text(text) => self.texts[*text].clone(),
             Op::Global(slot) => {
-                self.globals[*slot].clone().ok_or("a constant is read that has no value yet")?
+                self.globals[*slot].clone().ok_or("this constant has no value yet")?
             }
             Op::List(items) => Value::list(self.all(items)?, meter)?,
             Op::Tuple(items) => Value::tuple(self.all(items)?, meter)?,
@@ -433,7 +445,8 @@ impl Machine<'_> {
                 best = Some((key, value));
             }
         }
-        best.map(|(_, value)| value).ok_or_else(|| "an empty list has no least or largest".into())
+        best.map(|(_, value)| value)
+            .ok_or_else(|| "an empty list has no smallest or largest element".into())
     }
 
     /// Values in the order of their keys; the sort is stable.
@@ -456,7 +469,7 @@ fn store(container: &Value, index: &Value, value: Value) -> Outcome<()> {
     match container {
         Value::List(list) => list.set(builtins::place(index, list.len())?, value),
         Value::Dict(dict) => dict.set(Key::new(index)?, value),
-        _ => Err(format!("a {} has no elements", container.kind()).into()),
+        _ => Err(format!("{} has no elements", container.kind_with_article()).into()),
     }
 }
 

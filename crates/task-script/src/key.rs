@@ -41,11 +41,11 @@ impl Key {
                 Self::Tuple(keys.collect::<Result<_, _>>()?)
             }
             Value::Object(object) => Self::Object(*object),
-            _ => return Err(format!("a {} cannot be a key of a dict", value.kind())),
+            _ => return Err(format!("{} cannot be a key of a dict", value.kind_with_article())),
         })
     }
 
-    /// Bytes that it takes on the heap.
+    /// Bytes of the key on the heap.
     pub(crate) fn bytes(&self) -> usize {
         match self {
             Self::Text(text) => text.len(),
@@ -71,9 +71,9 @@ impl Key {
     }
 }
 
-/// A float as a whole number, if it is one.
+/// Converts a float to a whole number, if it is one.
 fn whole(value: f64) -> Option<i64> {
-    /// Up to this number, every whole number is exactly a float.
+    /// Floats represent every whole number up to this one exactly.
     const EXACT: f64 = (1_i64 << 53) as f64;
     (value.abs() <= EXACT && value.fract() == 0.0).then_some(value as i64)
 }

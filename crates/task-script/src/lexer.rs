@@ -22,7 +22,7 @@ pub(crate) enum Kind<'a> {
     Newline,
     /// The next line is indented further.
     Indent,
-    /// The next line closes one block.
+    /// The next line ends a block.
     Dedent,
     End,
 }
@@ -141,7 +141,7 @@ impl<'a> Lexer<'a> {
         let current = *self.indents.last().expect("the outermost block never closes");
         if width > current {
             if self.indents.len() > BLOCKS {
-                return Err(self.fault(format!("more than {BLOCKS} blocks within each other")));
+                return Err(self.fault(format!("more than {BLOCKS} nested blocks")));
             }
             self.indents.push(width);
             self.push(Kind::Indent);
@@ -151,7 +151,7 @@ impl<'a> Lexer<'a> {
             self.push(Kind::Dedent);
         }
         if width != *self.indents.last().expect("the outermost block never closes") {
-            return Err(self.fault("the indentation is that of no open block"));
+            return Err(self.fault("the indentation matches no open block"));
         }
         Ok(())
     }
@@ -235,7 +235,7 @@ impl<'a> Lexer<'a> {
     fn operator(&mut self, c: char) -> Outcome<()> {
         let known = OPERATORS.into_iter().find(|operator| self.rest().starts_with(operator));
         let Some(operator) = known else {
-            return Err(self.fault(format!("`{}` means nothing here", shortened(&c.to_string()))));
+            return Err(self.fault(format!("`{}` has no meaning here", shortened(&c.to_string()))));
         };
         match operator {
             "(" | "[" | "{" => self.brackets += 1,
@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_token_is_refused_with_its_line() {
+    fn invalid_tokens_are_refused_with_their_line() {
         for (text, line) in [
             ("a\n$", 2),
             ("'a", 1),

@@ -9,7 +9,7 @@
 //! use task_script::{Host, Limits, Meter, Name, Object, Program, Value, Vocabulary};
 //! use std::rc::Rc;
 //!
-//! /// A world that is so many cm wide.
+//! /// A world with a width in cm.
 //! struct World(f64);
 //!
 //! impl Host for World {
@@ -34,7 +34,7 @@
 //! assert_eq!(script.call(&program, fitness, &[world], &mut World(8.0))?.number(), Some(12.0));
 //!
 //! let wrong = Program::compile("half.star", &text.replace("width", "widht"), &vocabulary);
-//! let message = "half.star:2: nothing has a `widht`; did you mean `width`?";
+//! let message = "half.star:2: no object has a `widht`; did you mean `width`?";
 //! assert_eq!(wrong.unwrap_err()[0].to_string(), message);
 //! # Ok::<(), task_script::ScriptError>(())
 //! ```
@@ -82,8 +82,8 @@ pub trait Host {
     /// `object.name = value`.
     fn set(&mut self, object: Object, name: Name, value: Value) -> Result<(), String>;
 
-    /// Whether to continue; called every few milliseconds of a call, which fails if the answer is
-    /// false. The answer may come from a clock or from another thread, so a stopped call has no
+    /// Whether the script may continue, asked every few milliseconds. If the answer is false, the
+    /// call fails. A clock or another thread may decide the answer, so a stopped call has no
     /// result.
     fn goes_on(&mut self) -> bool {
         true
@@ -129,7 +129,7 @@ impl Program {
         vocabulary: &Vocabulary,
     ) -> Result<Self, Vec<ScriptError>> {
         if text.len() > TEXT_BYTES {
-            let message = format!("has {} bytes; a script has at most {TEXT_BYTES}", text.len());
+            let message = format!("the script has {} bytes, the limit is {TEXT_BYTES}", text.len());
             return Err(vec![ScriptError { file: file.into(), line: 1, message }]);
         }
         match parser::parse(text, vocabulary) {
@@ -201,7 +201,7 @@ pub struct Script {
 }
 
 impl Script {
-    /// Its meter, for values that the host makes.
+    /// The meter of the script, for values that the host makes.
     pub fn meter(&self) -> &Rc<Meter> {
         &self.meter
     }
@@ -222,7 +222,8 @@ impl Script {
         self.call_again(program, function, arguments, host)
     }
 
-    /// As [`call`](Self::call), with the remaining work since the last [`refill`](Self::refill).
+    /// As [`call`](Self::call), but with the work that remains since the last
+    /// [`refill`](Self::refill).
     ///
     /// # Errors
     ///

@@ -5,8 +5,8 @@ use std::rc::Rc;
 
 use crate::value::Holder;
 
-/// The costs of operations, in units of about three nanoseconds. Reading all of a text, list or
-/// dict costs its length; `value` and `key` give no other access.
+/// The costs of operations, in units of about three nanoseconds. `value` and `key` charge the
+/// length of a text, list or dict for reading all of it; other modules cannot read it directly.
 pub(crate) mod cost {
     /// A statement, an iteration, a call, or an element that a function visits.
     pub const STATEMENT: u64 = 64;
@@ -42,11 +42,11 @@ pub struct Meter {
     limits: Limits,
     /// Remaining work of the call, in units.
     work_left: Cell<u64>,
-    /// The host is asked again when only this much work is left.
+    /// Remaining work at which to ask the host again.
     next_question: Cell<u64>,
     memory: Cell<usize>,
-    /// Lists and dicts that may be part of a cycle, and their number at the last removal of
-    /// unused ones.
+    /// Lists and dicts that may be part of a cycle, and their number after the last removal of
+    /// unused entries.
     holders: RefCell<(Vec<Holder>, usize)>,
 }
 
@@ -105,7 +105,7 @@ impl Meter {
     #[cold]
     fn too_much(&self) -> String {
         format!(
-            "does too much: more than {} statements, iterations and calls in one step, or as much \
+            "the script does too much: more than {} statements, iterations and calls in one step, or as much \
              work within them",
             self.limits.work
         )
@@ -117,9 +117,9 @@ impl Meter {
         self.work_left.get() <= self.next_question.get()
     }
 
-    /// Sets the next question after one to the host.
+    /// Schedules the next question to the host.
     pub(crate) fn ask_later(&self) {
-        // A call ends before the question at zero work.
+        // At zero work, the call fails before it would ask.
         self.next_question.set(self.work_left.get().saturating_sub(PATIENCE));
     }
 
@@ -135,7 +135,7 @@ impl Meter {
         let memory = self.memory.get().saturating_add(bytes);
         if memory > self.limits.memory {
             return Err(format!(
-                "keeps too much: more than {} KiB in lists, dicts and texts",
+                "the script keeps too much: more than {} KiB in lists, dicts and texts",
                 self.limits.memory / 1024
             ));
         }
@@ -153,7 +153,7 @@ impl Meter {
         self.memory.get()
     }
 
-    /// Notes a list or dict that may contain itself, to take it apart in the end.
+    /// Notes a list or dict that may contain itself, for [`take_apart`](Self::take_apart).
     pub(crate) fn note(&self, holder: Holder) {
         let (holders, n_used) = &mut *self.holders.borrow_mut();
         holders.push(holder);
@@ -163,7 +163,7 @@ impl Meter {
         }
     }
 
-    /// Takes lists and dicts apart that may contain themselves.
+    /// Empties the lists and dicts that may contain themselves, which frees them.
     pub(crate) fn take_apart(&self) {
         let (holders, _) = std::mem::take(&mut *self.holders.borrow_mut());
         for holder in holders {

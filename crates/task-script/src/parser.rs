@@ -121,7 +121,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Notes an unknown name, with a suggestion. A suggestion compares the name with all known
-    /// ones, so only reported names get one.
+    /// names, so only reported names get one.
     fn unknown(&mut self, line: u32, what: &str, name: &str, known: impl Fn(&Self) -> Vec<&str>) {
         if self.problems.len() < PROBLEMS {
             let suggestion = suggestion(name, &known(self));
@@ -193,7 +193,8 @@ impl<'a> Parser<'a> {
                     // A docstring.
                     StmtKind::Expr(Expr { op: Op::Text(_), .. }) | StmtKind::Pass => {}
                     _ => {
-                        let message = "outside functions, there are only constants, `NAME = value`";
+                        let message =
+                            "outside functions, only constants are allowed: `NAME = value`";
                         return Err(Fault::new(line, message));
                     }
                 }
@@ -209,7 +210,7 @@ impl<'a> Parser<'a> {
         let line = self.line();
         let name = self.own_name()?;
         if self.globals.contains(&name) || self.functions.iter().any(|other| other.name == name) {
-            self.problem(line, format!("there is another `{name}`"));
+            self.problem(line, format!("`{name}` is defined twice"));
         }
         self.expect("(")?;
         let outer = std::mem::take(&mut self.scope);
@@ -219,7 +220,7 @@ impl<'a> Parser<'a> {
             let line = self.line();
             let parameter = self.own_name()?;
             if !self.scope.declare_parameter(parameter) {
-                self.problem(line, format!("there is another parameter `{parameter}`"));
+                self.problem(line, format!("the parameter `{parameter}` occurs twice"));
             }
             n_parameters += 1;
             if !self.accept(",") {
@@ -250,7 +251,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The names that an expression may have.
+    /// The names that an expression may use.
     fn known_names(&self, scope: &Scope<'a>) -> Vec<&'a str> {
         let functions = self.signatures.iter().map(|(name, _)| *name);
         let builtins = crate::code::Builtin::NAMES.iter().copied();
@@ -297,7 +298,7 @@ impl<'a> Parser<'a> {
             self.n_loops -= 1;
             block.push(Stmt { line, kind: StmtKind::For(target, list, body) });
         } else if self.accept_word("def") {
-            return Err(Fault::new(line, "a function cannot be within another one"));
+            return Err(Fault::new(line, "a function cannot contain another one"));
         } else {
             block.append(&mut self.simple_line()?);
         }
@@ -336,14 +337,14 @@ impl<'a> Parser<'a> {
         for (word, kind) in [("break", StmtKind::Break), ("continue", StmtKind::Continue)] {
             if self.accept_word(word) {
                 if self.n_loops == 0 {
-                    return Err(self.fault(format!("`{word}` belongs into a `for`")));
+                    return Err(self.fault(format!("`{word}` belongs in a `for`")));
                 }
                 return Ok(kind);
             }
         }
         if self.accept_word("return") {
             if !self.in_function {
-                return Err(self.fault("`return` belongs into a function"));
+                return Err(self.fault("`return` belongs in a function"));
             }
             let is_empty = matches!(self.kind(), Kind::Newline | Kind::Operator(";"));
             return Ok(StmtKind::Return(if is_empty {
@@ -359,7 +360,7 @@ impl<'a> Parser<'a> {
             self.expect("=")?;
             let value = self.expression_list()?;
             if let Kind::Operator("=") = self.kind() {
-                return Err(self.fault("one `=` per line"));
+                return Err(self.fault("only one `=` per line"));
             }
             return Ok(StmtKind::Assign(target, value));
         }
@@ -474,7 +475,7 @@ impl<'a> Parser<'a> {
             self.problem(line, format!("`{name}` is a function: call it, `{name}(...)`"));
             return Op::Nothing;
         }
-        // The assignment may follow further down, in a loop.
+        // In a loop, the assignment may follow further down.
         Op::Local(self.scope.expect(name, line))
     }
 
@@ -482,7 +483,7 @@ impl<'a> Parser<'a> {
     fn deeper(&mut self) -> Outcome<()> {
         self.depth += 1;
         if self.depth > crate::code::DEPTH {
-            return Err(self.fault("too many expressions within each other; use variables"));
+            return Err(self.fault("too many nested expressions; use variables"));
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use crate::builtins;
 use crate::error::Outcome;
 use crate::value::Value;
 
-/// Keys with a total order, which sorting needs: all are numbers, or all are texts.
+/// Keys with a total order, which sorting needs: only numbers, or only texts.
 pub struct Keys {
     are_texts: bool,
     /// Bytes of all texts.

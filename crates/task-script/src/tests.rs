@@ -1,4 +1,4 @@
-//! The results of scripts, and the errors of wrong ones.
+//! The results of scripts, and the errors of faulty scripts.
 
 use super::*;
 
@@ -42,7 +42,7 @@ fn run_measured(text: &str) -> (Result<Value, ScriptError>, usize) {
     let n_kept = meter.memory() - before;
     if value.is_err() {
         drop(script);
-        assert_eq!(meter.memory(), 0, "all is given back: {text}");
+        assert_eq!(meter.memory(), 0, "all memory is released: {text}");
     }
     (value, n_kept)
 }
@@ -59,7 +59,7 @@ fn holds(statements: &str, condition: &str) -> bool {
 }
 
 #[test]
-fn scripts_compute_what_python_does() {
+fn scripts_compute_the_same_as_python() {
     let cases = [
         ("a = 7", "a // 2 == 3 and -a // 2 == -4 and a // -2 == -4 and -a // -2 == 3"),
         ("a = 7", "a % 3 == 1 and -a % 3 == 2 and a % -3 == -2 and -7.5 % 2 == 0.5"),
@@ -120,7 +120,7 @@ fn functions_may_stand_in_any_order_and_constants_are_shared() {
 }
 
 #[test]
-fn all_names_that_mean_nothing_are_reported_at_once_with_suggestions() {
+fn all_unknown_names_are_reported_at_once_with_suggestions() {
     let text = "def fitness(world):\n    n = lenn([1])\n    return hedaing(n) + wrold.heading\n    \
                 n.haeding\n    math.cos(1)\n";
     let errors: Vec<String> = compile(text).unwrap_err().iter().map(ToString::to_string).collect();
@@ -128,7 +128,7 @@ fn all_names_that_mean_nothing_are_reported_at_once_with_suggestions() {
         "t.star:2: no function is named `lenn`; did you mean `len`?",
         "t.star:3: no function is named `hedaing`; ",
         "t.star:3: unknown name `wrold`; did you mean `world`?",
-        "t.star:4: nothing has a `haeding`; did you mean `heading`?",
+        "t.star:4: no object has a `haeding`; did you mean `heading`?",
     ];
     assert_eq!(errors.len(), expected.len(), "{errors:?}");
     for (error, expected) in errors.iter().zip(expected) {
@@ -137,7 +137,7 @@ fn all_names_that_mean_nothing_are_reported_at_once_with_suggestions() {
 }
 
 #[test]
-fn what_is_not_in_the_language_is_refused_with_what_is() {
+fn missing_features_of_python_are_refused_with_their_replacement() {
     for (line, expected) in [
         ("while x:", "there is no `while`"),
         ("import os", "imports nothing"),
@@ -146,12 +146,12 @@ fn what_is_not_in_the_language_is_refused_with_what_is() {
         ("return x is None", "end of the line"),
         ("return lambda y: y", "only be the `key`"),
         ("print(x)", "nothing can be printed"),
-        ("def g(): pass", "within another"),
+        ("def g(): pass", "contain another"),
         ("return g'{x}'", "end of the line"),
         ("x = y = 1", "one `=`"),
-        ("return sorted(x, cmp=1)", "by their place"),
-        ("break", "belongs into a `for`"),
-        ("f(1, 2)", "takes 1 arguments, here are 2"),
+        ("return sorted(x, cmp=1)", "by position"),
+        ("break", "belongs in a `for`"),
+        ("f(1, 2)", "takes 1 arguments, found 2"),
         ("len = 3", "is taken"),
         ("return math.sine(1)", "`math` has no `sine`; did you mean `sin`?"),
         ("return x(1)", "no function is named `x`"),
@@ -164,18 +164,18 @@ fn what_is_not_in_the_language_is_refused_with_what_is() {
 }
 
 #[test]
-fn what_goes_wrong_is_said_with_its_line() {
+fn errors_name_their_line_and_reason() {
     for (line, expected) in [
         ("return 1 / (x.heading - 7)", "division by zero"),
         ("return [1][3]", "there is no element 3 in a list of 1"),
         ("return {'a': 1}['b']", "the dict has no key \"b\""),
         ("return 'a' + 1", "`+` does not take string and int"),
         ("return x.neighbours + 1", ""),
-        ("return len(3)", "a int has no length"),
+        ("return len(3)", "an int has no length"),
         ("if False: y = 1\n    return y", "has no value yet"),
         ("a, b = [1]", "1 values for 2 names"),
         ("return 9000000000000000000 * 9", "more than 64 bits"),
-        ("return f(x)", "more than 16 calls"),
+        ("return f(x)", "more than 16 nested calls"),
         ("x.heading = 3", "cannot be changed"),
         ("C.append(1)", "constant"),
         ("return sorted([1, 'a'])", "have no order"),
@@ -197,27 +197,27 @@ fn what_goes_wrong_is_said_with_its_line() {
 }
 
 #[test]
-fn what_has_no_order_is_not_sorted_and_large_numbers_are() {
+fn values_without_an_order_are_refused_and_large_numbers_are_sorted() {
     // Long enough for the sort to notice an inconsistent order.
     let nan =
         "n = math.inf - math.inf\n    l = [n if i % 7 == 3 else (i * 31) % 50 for i in range(90)]";
     for (l, expected) in [
-        (nan, "not a number (NaN) has no order"),
-        ("l = [str_of[i % 2] for i in range(90)]", "a int and a string have no order"),
+        (nan, "NaN (not a number) has no order"),
+        ("l = [str_of[i % 2] for i in range(90)]", "an int and a string have no order"),
         ("l = [[i] for i in range(90)]", "a list and a list have no order"),
     ] {
         let l = l.replace("str_of", "[1, 'a']");
         let error = run(&format!("def f(x):\n    {l}\n    return sorted(l)")).unwrap_err();
         assert!(error.message.contains(expected), "{l}: {error}");
     }
-    // Different whole numbers that are the same float.
+    // Different whole numbers that round to the same float.
     let large =
         "b = 9007199254740992\nl = [b + i % 3 if i % 2 else (b + i % 3) * 1.0 for i in range(90)]";
     assert!(holds(large, "sorted(l)[0] == b and sorted([2, 1.5, 1]) == [1, 1.5, 2]"));
 }
 
 #[test]
-fn what_runs_away_ends() {
+fn runaway_scripts_end() {
     for body in [
         "for i in range(1000):\n        for j in range(1000):\n            x",
         "return [i for i in range(1000) for j in range(1000)]",
@@ -231,7 +231,7 @@ fn what_runs_away_ends() {
         "l = []\n    for i in range(9000): l.append([i, i, i])",
     ] {
         let error = run(&format!("def f(x):\n    {body}\n    return 1")).unwrap_err();
-        let expected = ["does too much", "keeps too much", "nested so deep", "cannot be a key"];
+        let expected = ["does too much", "keeps too much", "nested this deep", "cannot be a key"];
         assert!(expected.iter().any(|message| error.message.contains(message)), "{body}: {error}");
     }
 }
@@ -276,7 +276,7 @@ fn texts_that_are_too_deep_or_too_long_are_refused() {
 }
 
 #[test]
-fn keys_of_returned_dicts_are_known_before() {
+fn keys_of_returned_dicts_are_known_without_execution() {
     let keys = |body: &str| {
         let program = compile(&format!("def m(x):\n    {body}\n")).unwrap();
         program.returned_keys(FunctionId(0)).map(<[String]>::to_vec)
@@ -289,6 +289,6 @@ fn keys_of_returned_dicts_are_known_before() {
 }
 
 #[test]
-fn texts_of_every_kind_of_statement_hold() {
+fn statements_on_one_line_and_attributes_work() {
     assert!(holds("pass; a = 1", "a == 1 and x.heading == 7 and x.neighbours(1) == None"));
 }

@@ -121,21 +121,21 @@ impl Value {
         }
     }
 
-    /// The text, if the value is one. Comparing it with a few short names is free; code that
-    /// reads the whole text, such as a comparison, has to pay for it.
+    /// The text, if the value is one. A comparison with a few short names is free. Code that reads
+    /// the whole text has to take the work of reading.
     pub fn as_text(&self) -> Option<&str> {
         if let Self::Text(text) = self { Some(&text.text) } else { None }
     }
 
-    /// The text, if the value is one; takes the work of reading it once.
+    /// The text, if the value is one; takes the work of one reading.
     pub(crate) fn read_text(&self) -> Result<Option<&str>, String> {
         let Self::Text(text) = self else { return Ok(None) };
         text.meter.read(text.text.len())?;
         Ok(Some(&text.text))
     }
 
-    /// Whether it counts as true in a condition: all values except `None`, `False`, zero and
-    /// empty ones.
+    /// Whether the value counts as true in a condition: all values do except `None`, `False`, zero
+    /// and empty ones.
     pub fn is_true(&self) -> bool {
         match self {
             Self::Nothing => false,
@@ -151,16 +151,22 @@ impl Value {
 
     /// Its kind, for messages.
     pub fn kind(&self) -> &'static str {
+        let with_article = self.kind_with_article();
+        with_article.split_once(' ').map_or(with_article, |(_, kind)| kind)
+    }
+
+    /// Its kind with an article, for messages.
+    pub fn kind_with_article(&self) -> &'static str {
         match self {
             Self::Nothing => "None",
-            Self::Bool(_) => "bool",
-            Self::Int(_) => "int",
-            Self::Float(_) => "float",
-            Self::Text(_) => "string",
-            Self::List(list) if list.is_tuple => "tuple",
-            Self::List(_) => "list",
-            Self::Dict(_) => "dict",
-            Self::Object(_) => "thing of the world",
+            Self::Bool(_) => "a bool",
+            Self::Int(_) => "an int",
+            Self::Float(_) => "a float",
+            Self::Text(_) => "a string",
+            Self::List(list) if list.is_tuple => "a tuple",
+            Self::List(_) => "a list",
+            Self::Dict(_) => "a dict",
+            Self::Object(_) => "a thing of the world",
         }
     }
 
@@ -181,7 +187,7 @@ impl Value {
                 continue;
             }
             state.set(State { is_frozen: true, ..state.get() });
-            // Happens once for each list or dict, so the work of making them covers it.
+            // A list or dict freezes only once, so the work of making it covers the work here.
             match &value {
                 Self::List(list) => pending.extend(list.items.borrow().iter().cloned()),
                 Self::Dict(dict) => pending.extend(dict.entries.borrow().values().cloned()),
@@ -217,7 +223,7 @@ impl Value {
                     return Ok(false);
                 }
                 if depth == 0 {
-                    return Err("lists that are nested so deep are not compared".into());
+                    return Err("lists nested this deep cannot be compared".into());
                 }
                 let (a, b) = (a.items.borrow(), b.items.borrow());
                 for (a, b) in a.iter().zip(b.iter()) {
@@ -228,7 +234,7 @@ impl Value {
                 true
             }
             (Self::Dict(a), Self::Dict(b)) if Rc::ptr_eq(a, b) => true,
-            (Self::Dict(_), Self::Dict(_)) => return Err("dicts are not compared".into()),
+            (Self::Dict(_), Self::Dict(_)) => return Err("dicts cannot be compared".into()),
             _ => match (self.number(), other.number()) {
                 (Some(a), Some(b)) => a == b,
                 _ => false,

@@ -14,7 +14,8 @@ use std::{
 
 use task_script::{Host, Limits, Meter, Name, Object, Program, ScriptError, Value, Vocabulary};
 
-/// A seventieth of the work of scripts in experiments, and the memory of those with many robots.
+/// A seventieth of the work that scripts of experiments may do, and the memory of experiments with
+/// many robots.
 const LIMITS: Limits = Limits { work: 40_000, memory: 1 << 20 };
 /// Longest time of a script on a busy machine. The work takes a few milliseconds; a script with
 /// uncounted work would take minutes.
@@ -209,7 +210,7 @@ fn expensive_scripts_end_within_their_budget() {
 }
 
 #[test]
-fn a_script_ends_when_its_host_says_so_whatever_it_does() {
+fn every_expression_ends_when_the_host_stops_the_script() {
     let functions = functions();
     let without_end = Limits { work: u64::MAX / 1000, memory: 16 << 20 };
     for (number, expression) in EXPRESSIONS.iter().enumerate() {
@@ -223,7 +224,7 @@ fn a_script_ends_when_its_host_says_so_whatever_it_does() {
 }
 
 #[test]
-fn texts_that_are_expensive_to_compile_are_done_in_a_moment() {
+fn expensive_texts_compile_in_a_moment() {
     let many = |n: usize, with: &dyn Fn(usize) -> String| (0..n).map(with).collect::<String>();
     let nested = "[[[[1 for x in y] for y in z] for z in w]] + ".repeat(600);
     for text in [

@@ -47,8 +47,8 @@ impl Parser<'_> {
         self.expr(line, Op::Dict(entries))
     }
 
-    /// The clauses of a comprehension, and its value, which stands before them; `None` if no
-    /// `for` comes before the end of the brackets.
+    /// Parses a comprehension: its clauses, and the value before them. Returns `None` if the
+    /// brackets contain no `for`.
     fn comprehension<T>(
         &mut self,
         close: &'static str,

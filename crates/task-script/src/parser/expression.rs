@@ -188,7 +188,7 @@ impl<'a> Parser<'a> {
         let container = if is_call { Method::named(name) } else { None };
         if host.is_none() && container.is_none() {
             let methods: &[&str] = if is_call { Method::NAMES } else { &[] };
-            self.unknown(line, "nothing has a", name, |parser| {
+            self.unknown(line, "no object has a", name, |parser| {
                 parser.vocabulary.names.iter().chain(methods).copied().collect()
             });
         }
@@ -299,7 +299,7 @@ impl<'a> Parser<'a> {
         if let Some(function) = function {
             let (expected, found) = (self.signatures[function].1, values.len());
             if expected != found {
-                let message = format!("`{name}` takes {expected} arguments, here are {found}");
+                let message = format!("`{name}` takes {expected} arguments, found {found}");
                 self.problem(line, message);
             }
             if key.is_some() || reverse.is_some() {
@@ -350,7 +350,7 @@ impl<'a> Parser<'a> {
                     arguments.reverse = Some(self.expression()?);
                 }
                 Kind::Name(_) if is_named => {
-                    return Err(self.fault("arguments are given by their place, not by name"));
+                    return Err(self.fault("arguments are given by position, not by name"));
                 }
                 _ => arguments.values.push(self.expression()?),
             }

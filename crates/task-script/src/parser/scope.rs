@@ -6,7 +6,7 @@ pub(super) struct Scope<'a> {
     variables: Vec<Entry<'a>>,
     /// Names of comprehensions and lambdas that are open, with their slots.
     inner: Vec<(&'a str, usize)>,
-    /// Number of names that hide outer ones: the index of the first open one.
+    /// Number of open comprehensions and lambdas.
     n_open: usize,
     n_locals: usize,
 }
@@ -20,11 +20,11 @@ struct Entry<'a> {
     line: u32,
 }
 
-/// A variable that was seen before.
+/// A variable that occurred earlier in the text.
 pub(super) enum Variable {
-    /// It was assigned earlier in the text.
+    /// A variable that was assigned.
     Known(usize),
-    /// It was only read.
+    /// A variable that was only read.
     Pending(usize),
 }
 
@@ -81,8 +81,8 @@ impl<'a> Scope<'a> {
         })
     }
 
-    /// Begins a comprehension or lambda, to which further names belong. Returns the mark for
-    /// [`close`](Self::close).
+    /// Begins a comprehension or lambda, which owns the names declared until its end. Returns the
+    /// mark for [`close`](Self::close).
     pub(super) fn open(&mut self) -> usize {
         self.n_open += 1;
         self.inner.len()

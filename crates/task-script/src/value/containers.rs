@@ -33,7 +33,7 @@ pub struct Dict {
 pub(super) struct State {
     /// Whether it is immutable from now on.
     pub(super) is_frozen: bool,
-    /// Whether the meter knows it as possible part of a cycle.
+    /// Whether the meter has noted it as a possible part of a cycle.
     pub(super) is_noted: bool,
 }
 
@@ -100,7 +100,7 @@ impl List {
         items
     }
 
-    /// A copy of its elements, which costs the work of as many statements.
+    /// A copy of its elements. Each element costs the work of a statement.
     ///
     /// # Errors
     ///
@@ -244,7 +244,7 @@ impl Dict {
         Ok(())
     }
 
-    /// Copies of its keys, which cost the work of as many statements.
+    /// Copies of its keys. Each key costs the work of a statement.
     pub(crate) fn keys(&self) -> Result<Vec<Key>, String> {
         self.meter.work(self.len())?;
         let entries = self.entries.borrow();
