@@ -73,7 +73,7 @@ impl Bundle {
         Ok(bytes)
     }
 
-    /// Reads a bundle. This proves only that the files have the digests in the bundle's
+    /// Reads a bundle. Reading proves only that the files have the digests in the bundle's
     /// description.
     ///
     /// # Errors
@@ -106,7 +106,7 @@ fn check_len(len: u64) -> Result<(), BundleError> {
     if len > LEN_MAX { Err(BundleError::TooLong { len }) } else { Ok(()) }
 }
 
-/// All files with their names. `room`: largest size of all files together, bytes.
+/// Unpacks all files, each with its name. `room`: largest size of all files together, bytes.
 ///
 /// # Errors
 ///
@@ -115,10 +115,10 @@ pub fn unpack(bytes: &[u8], mut room: u64) -> Result<Vec<(String, Vec<u8>)>, Bun
     let damaged = |error: &dyn std::fmt::Display| BundleError::Archive(error.to_string());
     let n_entries = directory::check(bytes).map_err(|what| damaged(&what))?;
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| damaged(&error))?;
-    // Of several files with the same name the library takes the last, and other programs another
-    // one.
+    // If several files have the same name, the library takes the last one, and other programs take
+    // another.
     if n_entries != archive.len() {
-        return Err(damaged(&"a file is in it twice"));
+        return Err(damaged(&"it contains a file twice"));
     }
     let description = (DESCRIPTION, description::LEN_MAX);
     let known: Vec<(&str, u64)> =
@@ -141,7 +141,7 @@ pub fn unpack(bytes: &[u8], mut room: u64) -> Result<Vec<(String, Vec<u8>)>, Bun
         }
         room = room.checked_sub(len).ok_or(BundleError::UnpackedTooLong)?;
         if len != stated {
-            return Err(damaged(&format!("`{file}` has {len} bytes, and not {stated}")));
+            return Err(damaged(&format!("`{file}` has {len} bytes, not {stated}")));
         }
         contents.push((name, content));
     }

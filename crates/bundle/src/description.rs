@@ -19,7 +19,7 @@ pub const DESCRIPTION: &str = "ro-crate-metadata.json";
 /// it.
 pub const LEN_MAX: u64 = 4 << 20;
 
-/// Largest length of a text to look at, bytes: a SHA-256 has 64.
+/// Length of the longest text that matters, bytes: a SHA-256 has 64.
 const SHORT_LEN_MAX: usize = 64;
 
 /// Describes a bundle that has these files.
@@ -103,15 +103,16 @@ pub fn check(description: &[u8], files: &[File]) -> Result<(), BundleError> {
     Ok(())
 }
 
-/// The part of a description that is read: one from a stranger may list millions of entities of
-/// any kind.
+/// The part of a description that this program reads. A stranger's description may list millions of
+/// entities of any kind.
 #[derive(Deserialize)]
 struct Document {
     #[serde(rename = "@graph")]
     graph: Graph,
 }
 
-/// The entities that may be files of a bundle, at most as many as a bundle has files.
+/// The entities that may be files of a bundle. Their number is at most that of the files of a
+/// bundle.
 struct Graph(Vec<Entity>);
 
 #[derive(Deserialize)]

@@ -15,7 +15,7 @@ const LOG: &str = "fitness-log.bin";
 const KEYFRAMES: &str = "keyframes.bin";
 const CHAMPION: &str = "champion.json";
 
-/// All files except the description, empty, in the order of the archive.
+/// All files except the description, still empty, in the order of the archive.
 pub fn all() -> [File; 6] {
     let file = |name, about, encoding, len_max| File {
         name,
@@ -28,7 +28,7 @@ pub fn all() -> [File; 6] {
     let file_len_max = limits::FILE_BYTES as u64;
     let (about, most) = ("Versions, digests and how the experiment ended", UNPACKED_LEN_MAX);
     [
-        // For a fork, it lists the differences between two experiment files.
+        // The manifest of a fork lists the differences between two experiment files.
         file(MANIFEST, about, json, 4 * file_len_max),
         file(
             EXPERIMENT,
@@ -43,7 +43,7 @@ pub fn all() -> [File; 6] {
     ]
 }
 
-/// Largest length of a line of `history.csv`, bytes; usual ones have 200.
+/// Largest length of a line of `history.csv`, bytes; a usual line has 200.
 const LINE_LEN_MAX: usize = 1 << 10;
 
 impl Bundle {
@@ -74,7 +74,7 @@ impl Bundle {
         let about: Manifest = serde_json::from_slice(&manifest.content)
             .map_err(|error| malformed(MANIFEST, &error))?;
         // Each file has only one valid encoding, so every bit counts.
-        let other_way = |file| malformed(file, &"it is not written as a bundle is");
+        let other_way = |file| malformed(file, &"it is not in the only valid encoding");
         if write_manifest(&about) != manifest.content {
             return Err(other_way(MANIFEST));
         }
@@ -84,9 +84,9 @@ impl Bundle {
             return Err(other_way(HISTORY));
         }
         drop(history);
-        // A row of the history is longer than an empty entry or state in memory, so the number of
-        // rows bounds the others. Entries of other generations are wrong; a later check reports
-        // them.
+        // In memory, a row of the history takes more than an empty entry or state. So the number of
+        // rows bounds the memory for entries and states. Entries of other generations are wrong; a
+        // later check reports them.
         let n_max = rows.len() as u64 + 1;
         let entries = read_frames(&log.content, n_max).map_err(|what| malformed(LOG, &what))?;
         drop(log);
@@ -154,14 +154,14 @@ fn read_history(bytes: &[u8], n_max: u64) -> Result<Vec<GenerationRow>, String> 
             return Err(too_many(n_max));
         }
         if row.generation != generation {
-            return Err(format!("generation {generation} is not where it belongs"));
+            return Err(format!("generation {generation} is out of place"));
         }
         history.push(row);
     }
     Ok(history)
 }
 
-/// Appends bytes after their length, which has 8 bytes, little-endian.
+/// Appends the length of `bytes`, in 8 bytes, little-endian, and then `bytes`.
 fn frame(file: &mut Vec<u8>, bytes: &[u8]) {
     file.extend((bytes.len() as u64).to_le_bytes());
     file.extend(bytes);
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_has_as_many_entries_as_generations_may_be() {
+    fn a_log_has_at_most_one_entry_per_generation() {
         assert_eq!(read_frames(&frames(&[3, 0, 5]), 3).unwrap()[2], [7; 5]);
         assert_eq!(read_frames(&frames(&[3, 0, 5]), 2), Err(too_many(2)));
     }
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn keyframes_are_in_order_and_not_more_than_there_are_generations() {
+    fn keyframes_are_in_order_and_at_most_one_per_generation() {
         assert_eq!(read_keyframes(&keyframes(&[1, 4]), 2).unwrap()[1].0, 4);
         for numbers in [[4, 1], [4, 4]] {
             let error = read_keyframes(&keyframes(&numbers), 2).unwrap_err();
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_history_has_as_many_rows_as_generations_may_be_each_in_its_place() {
+    fn a_history_has_one_row_per_generation_each_in_its_place() {
         let Statistics { best, mean, min, standard_deviation } =
             Statistics::from_fitness(&[1.0, 0.0]);
         let row = GenerationRow {
@@ -297,6 +297,6 @@ mod tests {
         assert_eq!(read_history(&two, 1).unwrap_err(), too_many(1));
         let twice = String::from_utf8(two).unwrap().replace("\n1,", "\n0,");
         let error = read_history(twice.as_bytes(), 9).unwrap_err();
-        assert!(error.contains("generation 1 is not where it belongs"), "{error}");
+        assert!(error.contains("generation 1 is out of place"), "{error}");
     }
 }

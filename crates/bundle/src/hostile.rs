@@ -1,5 +1,5 @@
-//! Bundles made to exhaust memory: for each, a process of its own refuses it, and the test
-//! measures the process's peak memory.
+//! Bundles made to exhaust memory. A separate process refuses each of them, and the test measures
+//! the peak memory of that process.
 
 use std::{env, fs, io::Write as _, process::Command};
 
@@ -19,7 +19,8 @@ const LEN: usize = 48 << 20;
 /// Largest memory of a bundle, per byte of its content.
 const FACTOR: usize = 4;
 
-/// Further memory of a process, bytes: the bound for lists without numbers is not proportional.
+/// Further memory of a process, bytes. Lists without numbers have a constant bound, whatever the
+/// size of the content.
 const BASE: usize = 160 << 20;
 
 /// Names the bundle that a process of this test reads.
@@ -57,9 +58,9 @@ fn archive(files: impl IntoIterator<Item = (&'static str, Vec<u8>)>) -> Vec<u8> 
     archive.finish().unwrap().into_inner()
 }
 
-/// An entry of the log, or a state, in which all lists but one are empty.
+/// An entry of the log, or a state, with a list of 40 million empty lists.
 fn empty_lists(before: &[u8]) -> Vec<u8> {
-    // 40 million as a number of variable length, and then as many zeros.
+    // The length 40 million as a number of variable length, and then zeros.
     let mut bytes = [before, &[0x80, 0xb4, 0x89, 0x13]].concat();
     bytes.resize(40_000_000, 0);
     bytes
@@ -79,7 +80,7 @@ fn with_state(state: Vec<u8>) -> Vec<u8> {
     with(&fork, "", Vec::new())
 }
 
-/// An archive with more entries than a directory of the first kind can count.
+/// An archive with more entries than a ZIP directory without extensions can count.
 fn many_entries() -> Vec<u8> {
     let mut archive = ZipWriter::new(std::io::Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
@@ -161,7 +162,7 @@ fn refusal(bytes: &[u8]) -> String {
     }
 }
 
-/// Peak memory of this process, bytes; `None` if the system does not tell.
+/// Peak memory of this process, bytes; `None` if the system does not report it.
 fn peak() -> Option<usize> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -169,14 +170,14 @@ fn peak() -> Option<usize> {
 }
 
 #[test]
-fn no_bundle_takes_more_memory_than_a_few_times_what_is_in_it() {
+fn no_bundle_takes_more_memory_than_a_few_times_its_content() {
     if let Some(path) = env::var_os(VARIABLE) {
         let refusal = refusal(&fs::read(path).unwrap());
         println!("refused: {refusal}\npeak: {}\n", peak().unwrap());
         return;
     }
     if peak().is_none() {
-        println!("SKIPPED: this system does not say what a process takes");
+        println!("SKIPPED: this system does not report the memory of a process");
         return;
     }
     let path = env::temp_dir().join(format!("swarm-hostile-{}.zip", std::process::id()));

@@ -1,9 +1,9 @@
-//! Bundles: an ended experiment as one self-verifying file, with everything from which its
-//! results follow.
+//! Bundles: an ended experiment as one self-verifying file, with all inputs of its results.
 //!
 //! A bundle is a ZIP archive and an [RO-Crate]. [`Bundle::read`] reads one without trusting it.
-//! [`Verification`] repeats the experiment's evolution and returns a [`Proof`]. It hands out
-//! [batches](Batch), whose simulation also proves the fitness. `docs/howto/publish.md` has the format.
+//! [`Verification`] repeats the experiment's evolution and returns a [`Proof`]. To prove the
+//! fitness as well, the caller simulates the [batches](Batch) that it hands out.
+//! `docs/howto/publish.md` has the format.
 //!
 //! [RO-Crate]: https://w3id.org/ro/crate/1.3
 
@@ -24,19 +24,19 @@ pub use files::champion_json;
 pub use sample::Sample;
 pub use verification::{Batch, Claim, Flaw, Proof, Verification};
 
-/// An ended experiment, and everything from which its results follow.
+/// An ended experiment, with all inputs of its results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bundle {
-    /// Names the experiment, its versions and digests.
+    /// The versions and digests of the experiment.
     pub manifest: Manifest,
     /// The experiment file in canonical form, including the seed.
     pub config_json: String,
     /// Every generation, including those that a fork shares with its parent.
     pub history: Vec<GenerationRow>,
-    /// The fitness log: for each generation of its own the bytes of
+    /// The fitness log: for each generation that is not shared with a parent, the bytes of
     /// [`evolution::Told::to_bytes`].
     pub log: Vec<Vec<u8>>,
-    /// States of evolution in order; the first one precedes the first generation of its own.
+    /// States of evolution in order. The first one precedes the first entry of the log.
     pub keyframes: Keyframes,
     /// The champion, as [`champion_json`] writes it.
     pub champion_json: String,
@@ -51,7 +51,7 @@ pub type Keyframes = Vec<(u64, Vec<u8>)>;
 pub struct Manifest {
     /// Version of the format of bundles.
     pub format: u32,
-    /// The program that wrote it, with its version.
+    /// The program that wrote the bundle, with its version.
     pub program: String,
     /// Fingerprint of the simulation that computed fitness.
     pub simulation: String,
@@ -59,17 +59,18 @@ pub struct Manifest {
     pub config_digest: Digest,
     /// The last link of the digest chain, which covers everything.
     pub digest: Digest,
-    /// How it ended: `completed`, `failed` or `cancelled`.
+    /// How the experiment ended: `completed`, `failed` or `cancelled`.
     pub state: String,
-    /// Why it ended, if it did not complete its generations.
+    /// Why the experiment ended, if it did not complete its generations.
     pub reason: String,
     /// Time of submission, milliseconds since 1970 UTC.
     pub submitted_at_ms: u64,
-    /// Its origin, if it is a fork.
+    /// The origin of a fork; `None` for other experiments.
     pub fork: Option<ForkOf>,
 }
 
-/// The origin of a fork, an experiment that continues the state of another one, its parent.
+/// The origin of a fork. A fork is an experiment that continues the state of another experiment,
+/// its parent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ForkOf {
@@ -85,7 +86,7 @@ pub struct ForkOf {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GenerationRow {
-    /// From 0: its place in the history.
+    /// Index of the generation and of the row, from 0.
     pub generation: u64,
     /// Largest of the individuals' mean fitness.
     pub best: Real,
@@ -101,7 +102,7 @@ pub struct GenerationRow {
     pub duration_ms: u64,
     /// Time of completion, milliseconds since 1970 UTC.
     pub completed_at_ms: u64,
-    /// Number of connected workers at its end.
+    /// Number of connected workers at the end of the generation.
     pub workers: u64,
     /// Share of the fleet's time without computation, 0 to 1.
     pub idle_share: f64,
@@ -120,11 +121,11 @@ impl GenerationRow {
 /// Version of the format that this code reads and writes.
 pub const FORMAT: u32 = 1;
 
-/// Why a file is not a bundle, or is one that this program cannot check.
+/// Why a file is not a bundle, or a bundle that this program cannot check.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BundleError {
     /// The file is too large to read.
-    #[error("it has {len} bytes, and a bundle at most {LEN_MAX}")]
+    #[error("it has {len} bytes, but a bundle has at most {LEN_MAX}")]
     TooLong {
         /// Its length.
         len: u64,
@@ -132,7 +133,7 @@ pub enum BundleError {
     /// The file is not a ZIP archive, or is damaged.
     #[error("it is not a bundle, or it is cut off or damaged: {0}")]
     Archive(String),
-    /// The unpacked files are too large together.
+    /// The unpacked files together are too large.
     #[error("unpacked it has more than {UNPACKED_LEN_MAX} bytes, so it is not a bundle")]
     UnpackedTooLong,
     /// One of the unpacked files is too large.
@@ -140,7 +141,7 @@ pub enum BundleError {
     FileTooLong {
         /// The file.
         file: &'static str,
-        /// Most bytes of it.
+        /// Its largest size, bytes.
         len_max: u64,
     },
     /// An unexpected file.
@@ -157,11 +158,11 @@ pub enum BundleError {
         /// The mistake in it.
         what: String,
     },
-    /// A file whose digest is not the one in the description.
+    /// A file whose digest differs from the description.
     #[error("its file `{0}` does not have the SHA-256 that its description states")]
     OtherFile(&'static str),
     /// The bundle has another version of the format.
-    #[error("it has the format {found} of bundles, written by {program}: that version reads it")]
+    #[error("it is a bundle of format {found}, written by {program}; use that version to read it")]
     Format {
         /// The format.
         found: u32,
@@ -170,8 +171,8 @@ pub enum BundleError {
     },
     /// Another version of the simulation computed the experiment.
     #[error(
-        "it was computed by the simulation \"{simulation}\" and written by {program}, which can \
-         check it; this version has \"{}\"",
+        "it was computed by the simulation \"{simulation}\" and written by {program}; use that \
+         version to check it, because this one has the simulation \"{}\"",
         sim_core::FINGERPRINT
     )]
     Simulation {
@@ -183,7 +184,7 @@ pub enum BundleError {
 }
 
 impl BundleError {
-    /// An error about a file with invalid content. `what`: may contain text from a stranger.
+    /// An error about a file with invalid content. `what` may contain text from a stranger.
     fn malformed(file: &'static str, what: &dyn fmt::Display) -> Self {
         Self::Malformed { file, what: archive::printable(&what.to_string()) }
     }

@@ -1,5 +1,5 @@
-//! Chooses the generations to simulate again. The run's own digest decides, so no person can
-//! choose them.
+//! Chooses the generations to simulate again. The run's digest determines them, so nobody can
+//! choose favourable ones.
 
 use std::collections::BTreeSet;
 

@@ -185,12 +185,12 @@ fn a_bundle_reads_back_and_everything_in_it_is_proven() {
 }
 
 #[test]
-fn a_bit_that_flips_in_any_file_is_found() {
+fn flipped_bits_of_every_file_are_found() {
     let contents = contents(bundle());
     let mut n_flips = 0;
     for (place, (name, content)) in contents.iter().enumerate().skip(1) {
         let n_bits = content.len() * 8;
-        // The step reaches every bit of a byte.
+        // The step is odd, so it reaches every bit of a byte.
         for bit in (0..n_bits).step_by((n_bits / 600) | 1) {
             let mut flipped = contents.clone();
             flipped[place].1[bit / 8] ^= 1 << (bit % 8);
@@ -203,7 +203,7 @@ fn a_bit_that_flips_in_any_file_is_found() {
 }
 
 #[test]
-fn a_bit_that_flips_is_found_without_the_digests_of_files() {
+fn flipped_bits_are_found_even_if_the_description_is_updated() {
     // An attacker who changes a file can update its description.
     let contents = contents(bundle());
     for (name, n_flips) in [("fitness-log.bin", 80), ("keyframes.bin", 40), ("champion.json", 20)] {
@@ -223,7 +223,7 @@ fn a_bit_that_flips_is_found_without_the_digests_of_files() {
 }
 
 #[test]
-fn a_bit_that_flips_in_the_archive_itself_is_found_or_means_nothing() {
+fn flipped_bits_of_the_archive_itself_are_found_or_without_effect() {
     let bytes = bundle().to_bytes().unwrap();
     let n_bits = bytes.len() * 8;
     let mut n_found = 0;
@@ -253,7 +253,7 @@ fn fitness_that_nobody_simulated_is_found_by_simulating() {
 }
 
 #[test]
-fn what_is_no_bundle_is_refused_in_one_line() {
+fn invalid_bundles_are_refused_in_one_line() {
     let refused = |bytes: &[u8], expected: &str| {
         let error = Bundle::read(bytes).unwrap_err().to_string();
         assert!(error.contains(expected) && error.lines().count() == 1, "{error}");
@@ -267,13 +267,13 @@ fn what_is_no_bundle_is_refused_in_one_line() {
         archive(contents(bundle()).into_iter().chain(more))
     };
     // The length is checked first.
-    refused(&vec![0; LEN_MAX as usize + 1], "and a bundle at most 201326592");
+    refused(&vec![0; LEN_MAX as usize + 1], "but a bundle has at most 201326592");
     // The second file of the same name has the same length, so that no offset changes.
     let mut twice = with("champion.jsom");
     while let Some(at) = twice.windows(13).position(|name| name == b"champion.jsom") {
         twice[at + 12] = b'n';
     }
-    refused(&twice, "a file is in it twice");
+    refused(&twice, "it contains a file twice");
     let mut followed = bytes.clone();
     followed.extend(b"more");
     refused(&followed, "something follows it");
@@ -288,7 +288,7 @@ fn what_is_no_bundle_is_refused_in_one_line() {
         files[1].1 = text.replace(from, to).into();
         archive(files)
     };
-    refused(&changed("\"format\": 1", "\"format\": 2"), "has the format 2 of bundles");
+    refused(&changed("\"format\": 1", "\"format\": 2"), "a bundle of format 2");
     let other = changed(FINGERPRINT, "sim-core 9.9.9 format 9");
     refused(
         &other,
@@ -334,7 +334,7 @@ pub fn forked() -> Bundle {
 }
 
 #[test]
-fn a_fork_is_proven_from_where_it_was_forked() {
+fn a_fork_is_proven_from_its_first_own_generation() {
     let fork = forked();
     assert_eq!(Bundle::read(&fork.to_bytes().unwrap()).unwrap(), fork);
     let proof = verify(&fork, Sample::All).unwrap();

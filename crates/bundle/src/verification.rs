@@ -1,7 +1,7 @@
 //! Repeats an experiment's evolution, and proves the claims of its bundle.
 //!
-//! Evolution is a function of seed and fitness. So the chain of digests, the history, the
-//! keyframes and the champion follow from the experiment file and the fitness log. Only the
+//! Evolution is a function of seed and fitness. So the chain of digests, the history, the keyframes
+//! and the champion follow from the experiment file and the fitness log. Only the proof of the
 //! fitness itself needs simulations, which the caller runs.
 
 use std::{collections::BTreeSet, fmt};
@@ -115,8 +115,9 @@ impl Batch {
         }
         for (i, (found, logged)) in simulated.iter().zip(&self.trial_fitness).enumerate() {
             if !same_bits(found, logged) {
-                let what =
-                    format!("genotype {i} has the fitness {found:?}, and the log {logged:?}");
+                let what = format!(
+                    "genotype {i} has the fitness {found:?}, but the log states {logged:?}"
+                );
                 return Err(flaw(what));
             }
         }
@@ -140,32 +141,32 @@ impl<'a> Verification<'a> {
         let (config, _) = ExperimentConfig::from_json(&bundle.config_json, "", ALGORITHMS)
             .map_err(|error| flaw(&one_line(&error)))?;
         if config.to_canonical_json() != bundle.config_json {
-            return Err(flaw(&"its file is not in canonical form"));
+            return Err(flaw(&"the experiment file is not in canonical form"));
         }
         let simulation = Simulation::compile(&config).map_err(|error| flaw(&one_line(&error)))?;
         let own = Digest::of_config(&config, FINGERPRINT);
         if own != bundle.manifest.config_digest {
             let stated = bundle.manifest.config_digest;
-            return Err(flaw(&format!("its file has the digest {own}, and not {stated}")));
+            return Err(flaw(&format!("the experiment file has the digest {own}, not {stated}")));
         }
         let (first, n_generations) = (bundle.first_own(), bundle.history.len() as u64);
         if n_generations != first.saturating_add(bundle.log.len() as u64) || bundle.log.is_empty() {
             return Err(Claim::Chain.flaw(format!(
-                "the history has {n_generations} generations, and the log {} from {first} on",
+                "the history has {n_generations} generations, but the log has {} from {first} on",
                 bundle.log.len()
             )));
         }
         if bundle.keyframes.first().is_none_or(|&(at, _)| at != first) {
-            return Err(Claim::Keyframes.flaw("there is none before the first generation"));
+            return Err(Claim::Keyframes.flaw("no keyframe precedes the first generation"));
         }
         if bundle.keyframes.last().is_some_and(|&(at, _)| at > n_generations) {
-            return Err(Claim::Keyframes.flaw("there is one after the last generation"));
+            return Err(Claim::Keyframes.flaw("a keyframe follows the last generation"));
         }
         let is_complete = n_generations == config.algorithm.generations;
         let should_be = bundle.manifest.state == "completed" && bundle.manifest.reason.is_empty();
         if n_generations > config.algorithm.generations || should_be && !is_complete {
             return Err(Claim::Champion.flaw(format!(
-                "it has {n_generations} generations, and its file asks for {}",
+                "the run has {n_generations} generations, but the experiment file requests {}",
                 config.algorithm.generations
             )));
         }
@@ -192,7 +193,7 @@ impl<'a> Verification<'a> {
         &self.simulation
     }
 
-    /// The number of repeated generations, and the number of all.
+    /// The number of repeated generations, and the number of generations to repeat.
     pub fn progress(&self) -> (u64, u64) {
         let first = self.bundle.first_own();
         (self.evolution.n_generations() - first, self.bundle.log.len() as u64)
@@ -208,7 +209,7 @@ impl<'a> Verification<'a> {
         let generation = self.evolution.n_generations();
         let place = (generation - self.bundle.first_own()) as usize;
         let Some(entry) = self.bundle.log.get(place) else { return Ok(None) };
-        // A forged state of a fork may be impossible for any algorithm.
+        // A forged state of a fork may make an algorithm panic.
         let step = panic_to_failure(|| Ok(self.step(generation, entry)));
         let flaw = |what: String| Claim::Chain.flaw(format!("generation {generation}: {what}"));
         step.unwrap_or_else(|what| Err(flaw(what))).map(Some)
@@ -220,14 +221,14 @@ impl<'a> Verification<'a> {
         self.compare_keyframe()?;
         let told = Told::from_bytes(entry).map_err(misfit)?;
         if told.to_bytes() != entry {
-            return Err(Claim::Chain.flaw(at(&"its entry is not written as entries are")));
+            return Err(Claim::Chain.flaw(at(&"its log entry is not in the only valid encoding")));
         }
         let row = &self.bundle.history[generation as usize];
         let Replay { summary, rounds } = self.evolution.replay(&told).map_err(misfit)?;
         if summary.digest != row.digest {
             let found = summary.digest;
             let what =
-                format!("what the log leads to has the digest {found}, and not {}", row.digest);
+                format!("the log gives the digest {found}, but the history states {}", row.digest);
             return Err(Claim::Chain.flaw(at(&what)));
         }
         let n_episodes: u64 = told.trial_fitness.iter().map(|trials| trials.len() as u64).sum();
@@ -240,7 +241,7 @@ impl<'a> Verification<'a> {
         let found = [0, 1, 2, 3].map(|i| as_stated(found[i], stated[i]));
         if !same_bits(&found, &stated) || row.episodes != n_episodes {
             return Err(Claim::History.flaw(at(&format!(
-                "its fitness is {found:?} of {n_episodes} episodes, and not {stated:?} of {}",
+                "its fitness is {found:?} of {n_episodes} episodes, not {stated:?} of {}",
                 row.episodes
             ))));
         }
@@ -257,7 +258,7 @@ impl<'a> Verification<'a> {
         let has_end = !told.end.blocks.is_empty() || !told.end.judgement.is_empty();
         if generation + 1 < self.bundle.history.len() as u64 {
             if has_end {
-                return Err(Claim::Chain.flaw(at(&"its entry says that it is the last one")));
+                return Err(Claim::Chain.flaw(at(&"its log entry contains an end of the run")));
             }
         } else {
             self.compare_keyframe()?;
@@ -274,12 +275,12 @@ impl<'a> Verification<'a> {
         let Outcome { champion, digest, rounds } = outcome;
         let stated = self.bundle.manifest.digest;
         if digest != stated {
-            let what = format!("the last link is {digest}, and not {stated}");
+            let what = format!("the last link is {digest}, not {stated}");
             return Err(Claim::Champion.flaw(what));
         }
         let text = champion.as_ref().map(champion_json).unwrap_or_default();
         if text != self.bundle.champion_json {
-            return Err(Claim::Champion.flaw("the log leads to another one"));
+            return Err(Claim::Champion.flaw("the log gives another champion"));
         }
         self.champion = champion;
         Ok(rounds.into_iter().map(Batch::from_round).collect())
@@ -293,13 +294,13 @@ impl<'a> Verification<'a> {
         }
         self.n_keyframes += 1;
         if *at < now || *state != self.evolution.keyframe() {
-            let what = format!("the one before generation {at} is not the state of evolution");
+            let what = format!("the keyframe before generation {at} is not the state of evolution");
             return Err(Claim::Keyframes.flaw(what));
         }
         Ok(())
     }
 
-    /// The proof, to call after the last generation, if all batches agree with their simulation.
+    /// The proof. Call it after the last generation, if all batches agree with their simulation.
     pub fn finish(self) -> Proof {
         let Self { bundle, evolution, sample, n_keyframes, n_episodes, champion, .. } = self;
         let (first, end) = (bundle.first_own(), evolution.n_generations());
@@ -315,7 +316,7 @@ impl<'a> Verification<'a> {
         let proven = vec![
             (
                 Claim::Experiment,
-                format!("its file has the digest {}", bundle.manifest.config_digest),
+                format!("the experiment file has the digest {}", bundle.manifest.config_digest),
             ),
             (
                 Claim::Chain,
@@ -330,7 +331,10 @@ impl<'a> Verification<'a> {
             (Claim::Keyframes, format!("{n_keyframes} of {n_keyframes} are states of evolution")),
             (
                 Claim::Champion,
-                format!("it and the last link, {}, follow from the log", bundle.manifest.digest),
+                format!(
+                    "the champion and the last link, {}, follow from the log",
+                    bundle.manifest.digest
+                ),
             ),
             (
                 Claim::Simulation,
@@ -340,12 +344,11 @@ impl<'a> Verification<'a> {
                 ),
             ),
         ];
-        let mut unproven =
-            vec!["times, workers and idle shares are what was written down".to_owned()];
+        let mut unproven = vec!["times, numbers of workers and idle shares".to_owned()];
         if let Some(fork) = &bundle.manifest.fork {
             unproven.push(format!(
-                "generations 0 to {} and the state after them are those of the experiment that \
-                 this is a fork of: verify its bundle, whose generation {} has the link {}",
+                "generations 0 to {} and the state after them, which the fork shares with its \
+                 parent: verify the parent's bundle, whose generation {} has the link {}",
                 fork.generation, fork.generation, bundle.history[fork.generation as usize].digest
             ));
         }
@@ -356,10 +359,14 @@ impl<'a> Verification<'a> {
 /// The first state of a fork. `own`: link -1 of its configuration; `new`: an evolution of the
 /// same shape.
 fn fork_start(bundle: &Bundle, own: Digest, new: &Evolution) -> Result<Evolution, Flaw> {
-    let flaw = |what: &dyn fmt::Display| Claim::Chain.flaw(format!("where it was forked: {what}"));
-    let Some(fork) = &bundle.manifest.fork else { return Err(flaw(&"it is not a fork")) };
+    let flaw =
+        |what: &dyn fmt::Display| Claim::Chain.flaw(format!("at the start of the fork: {what}"));
+    let Some(fork) = &bundle.manifest.fork else {
+        return Err(flaw(&"the manifest names no origin"));
+    };
     let parent = bundle.history.get(fork.generation as usize);
-    let parent = parent.ok_or_else(|| flaw(&"there is no such generation"))?.digest;
+    let parent =
+        parent.ok_or_else(|| flaw(&"the history lacks the last shared generation"))?.digest;
     if fork.link != parent && fork.link != parent.forked(own) {
         return Err(flaw(&format!("the link {} does not follow from {parent}", fork.link)));
     }
@@ -370,13 +377,14 @@ fn fork_start(bundle: &Bundle, own: Digest, new: &Evolution) -> Result<Evolution
         || state.n_generations() != bundle.first_own()
         || state.digest() != fork.link
     {
-        return Err(Claim::Keyframes.flaw("the first one is not the state that it was forked from"));
+        return Err(Claim::Keyframes
+            .flaw("the first keyframe is not the state from which the fork continues"));
     }
     Ok(state)
 }
 
-/// The found value; or the stated one if it is infinite, because sums overflowed in the version
-/// that wrote it.
+/// Returns `stated` if it is infinite because sums overflowed in the version that wrote it,
+/// otherwise `found`.
 fn as_stated(found: f64, stated: f64) -> f64 {
     let overflowed = stated.is_infinite() && found.abs() > f64::MAX.sqrt() / 1e9;
     if overflowed { stated } else { found }
