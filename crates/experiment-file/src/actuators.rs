@@ -1,4 +1,4 @@
-//! What robots act with.
+//! The actuators of robots.
 
 use crate::DefaultValue::{Switch, Whole};
 use crate::parameters::{Also, parameters};
@@ -28,12 +28,12 @@ impl ActuatorsConfig {
     }
 }
 
-/// SpikeSwarmSim moves by `dt` times the sum of the actions, in cm; the same
-/// as a step of `dt / 5` seconds at 10 cm/s.
+/// SpikeSwarmSim moves a robot by `dt` times the sum of its actions, in cm. A step of `dt / 5`
+/// seconds at 10 cm/s does the same.
 const DT: Also = Also {
     key: "dt",
     max: limits::MAGNITUDE,
-    meaning: "In place of `step_duration`, which is a fifth of it.",
+    meaning: "Replaces `step_duration`, which is a fifth of `dt`.",
     value: |dt| dt / 5.0,
 };
 
@@ -47,7 +47,7 @@ parameters! {
         /// Duration of an environment step dk, s.
         step_duration: f64 = positive(0.33).also(DT),
     }
-    // A dead zone of no width; SpikeSwarmSim has others, too.
+    // Width of a dead zone, which SpikeSwarmSim lets files choose.
     checked { Parameter::between("min_thresh", [0.0; 2], 0.0, "Accepted if it is 0") }
 
     /// LED.
@@ -66,8 +66,8 @@ parameters! {
         n_symbols: u32 = whole([2, limits::LATTICE_POINTS], 16),
         /// Inverse temperature of the quantiser.
         beta: f64 = amount(100.0),
-        /// Steps at the start of an episode in which the robot sends, whatever its network
-        /// says.
+        /// Steps at the start of an episode in which the robot always sends, whatever its network
+        /// decides.
         sending_steps: u32 = whole([0, limits::STEPS], 10).original(Whole(11)).recent(),
         /// Whether a frame with the message 0 is on the air before the first step.
         initial_frame: bool = switch(false).original(Switch(true)).recent(),

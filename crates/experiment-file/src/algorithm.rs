@@ -23,7 +23,7 @@ parameters! {
         evaluation_steps: u32 = of(Domain::Whole(1, limits::STEPS), Required),
         /// Trials per individual.
         num_evaluations: u32 = of(Domain::Whole(1, limits::TRIALS), Required),
-        /// Fitness of a trial. It may be left out if there is a `task`.
+        /// Fitness of a trial. Optional if there is a `task`.
         fitness_function: FitnessFunction =
             of(Domain::Variant(FitnessFunction::VARIANTS), Depends("")),
         /// Constants of fitness functions.
@@ -31,18 +31,19 @@ parameters! {
             of(Domain::Object(FitnessParams::OBJECT), Empty).recent(),
         /// Stop when the mean fitness of a generation reaches this.
         target_fitness: Option<f64> = of(Domain::QUANTITY, Null),
-        /// Generations from one comparison of candidates for the champion to the next. There is one
-        /// at the end, too.
+        /// Generations between two comparisons of candidates for the champion. The last comparison
+        /// is at the end of the run.
         champion_every: u64 = whole([1, limits::GENERATIONS as u32], 10),
-        /// Held-out trials of a comparison. Close candidates get up to four times as many.
+        /// Held-out trials of a comparison. Close candidates get up to four times this number.
         champion_trials: u32 = whole([1, limits::TRIALS], 50),
-        // 0 leaves the key out, for digests of generations alone.
+        // Digests of generations do not cover this key: they hash the canonical form with 0, which
+        // omits it.
         /// Trials that judge the champion at the end of a run and select nothing.
         judgement_trials: u32 = whole([1, limits::TRIALS], 200).unless_zero(),
     }
     parts {
-        /// Populations, by names that you choose, in the order of the genotype. Several evolve
-        /// together.
+        /// Populations, by names that you choose, in the order of the genotype. Several populations
+        /// evolve together.
         populations: NamedMap<PopulationConfig> = required(schema::map::<PopulationConfig>);
     }
 }

@@ -1,4 +1,4 @@
-//! How stimuli become spikes: encoders, and the receptive fields before them.
+//! How stimuli become spikes: receptive fields, and the encoders behind them.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -8,8 +8,8 @@ use super::{limits, schema};
 use crate::parameters::{kinds, parameters};
 use crate::{DefaultValue, Domain};
 
-/// How a stimulus becomes spikes: each of its values passes a receptive field, whose nodes
-/// spike. Of spiking neurons only.
+/// How a stimulus becomes spikes: each of its values passes a receptive field, whose nodes spike.
+/// Only spiking neurons take encoders.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, transform = schema::optional("receptive_field"))]
 pub struct EncodingConfig {
@@ -31,9 +31,9 @@ pub enum EncodingScheme {
     /// s = 1. x is cut to the range from 0 to 10,000.
     #[serde(rename = "PoissonRateCoding")]
     PoissonRate,
-    /// One spike per environment step, in substep x rounded down, the first being 1 (Thorpe and
-    /// Gautrais 1998). x is cut to the range from 1 to `time_scale`, and there must be at least
-    /// as many substeps as nodes.
+    /// One spike per environment step, in substep x rounded down, where the first substep is 1
+    /// (Thorpe and Gautrais 1998). x is cut to the range from 1 to `time_scale`, and there must be
+    /// at least as many substeps as nodes.
     #[serde(rename = "RankOrderCoding")]
     RankOrder,
 }
@@ -46,7 +46,7 @@ kinds! {
     pub enum ReceptiveField by "name" then receptive_fields {
         /// s itself, one node per value.
         Identity {} = "identity_receptive_field",
-        /// x = exp(-sigma d^2). A field that has no name is this one.
+        /// x = exp(-sigma d^2). The default if a file names no field.
         Gaussian(GaussianField) = "gaussian_receptive_field",
         /// x = 1 - slope |d|, at least 0.
         Triangular(SlopedField) = "triangular_receptive_field",
@@ -55,13 +55,13 @@ kinds! {
         /// x = 1 - slope d^2, at least 0.
         Parabolic(SlopedField) = "parabolic_receptive_field",
         /// `n_neurons` nodes for the whole stimulus, each a weighted sum of its values. Weights can
-        /// evolve (`encoders:weights:NAME`); others are exp(-|i - c|), with i the number of the
-        /// value from 0, and centres c evenly from 0 to the number of values.
+        /// evolve (`encoders:weights:NAME`). Other weights are exp(-|i - c|), with i the number of
+        /// the value from 0, and centres c spaced evenly from 0 to the number of values.
         Linear(LinearField) = "linear_receptive_field",
     }
 }
 
-/// The field of a file that names none.
+/// The field if a file names none.
 pub(super) const DEFAULT_FIELD: &str = "gaussian_receptive_field";
 
 const VALUE: [f64; 2] = [-limits::FIELD_VALUE, limits::FIELD_VALUE];
@@ -69,16 +69,16 @@ const MIN_VAL: DefaultValue = DefaultValue::Depends("0, of `RankOrderCoding` 1")
 const MAX_VAL: DefaultValue = DefaultValue::Depends("1, of `RankOrderCoding` `time_scale`");
 
 parameters! {
-    /// A field that falls like a bell.
+    /// A field with the shape of a bell.
     #[derive(Copy)]
     pub struct GaussianField {
         /// Factor of d^2.
         sigma: f64 = between([0.0, limits::STEEPNESS], 6.0),
         /// Nodes for each value of the stimulus.
         n_neurons: u32 = whole([1, limits::FIELD_NODES], 1),
-        /// Centre of the first node, or of the only one.
+        /// Centre of the first node, or of a single node.
         min_stim: f64 = between(VALUE, 0.0),
-        /// Centre of the last node, if there are two or more. The others are evenly between.
+        /// Centre of the last node, if there are two or more. The other centres are evenly between.
         max_stim: f64 = between(VALUE, 1.0),
         /// Value of a node far from its centre.
         min_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MIN_VAL),
@@ -95,9 +95,9 @@ parameters! {
         slope: f64 = between([0.0, limits::STEEPNESS], 5.0),
         /// Nodes for each value of the stimulus.
         n_neurons: u32 = whole([1, limits::FIELD_NODES], 1),
-        /// Centre of the first node, or of the only one.
+        /// Centre of the first node, or of a single node.
         min_stim: f64 = between(VALUE, 0.0),
-        /// Centre of the last node, if there are two or more. The others are evenly between.
+        /// Centre of the last node, if there are two or more. The other centres are evenly between.
         max_stim: f64 = between(VALUE, 1.0),
         /// Value of a node far from its centre.
         min_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MIN_VAL),
@@ -107,8 +107,8 @@ parameters! {
         inverted: bool = switch(false),
     }
 
-    /// A field whose weights can evolve. A weight that no query covers is exp(-|i - c|), with i
-    /// the number of the value, and centres c evenly from 0 to their number.
+    /// A field whose weights can evolve. A weight that no query covers is exp(-|i - c|), with i the
+    /// number of the value, and centres c spaced evenly from 0 to the number of values.
     #[derive(Copy)]
     pub struct LinearField {
         /// Nodes for the whole stimulus.
@@ -129,7 +129,7 @@ pub struct RadialField {
     pub centres: [f64; 2],
     /// Values for 0 and 1 of the shape, before `inverted`.
     pub values: [f64; 2],
-    /// Whether to use 1 - the shape.
+    /// Whether 1 - shape replaces the shape.
     pub inverted: bool,
 }
 
@@ -222,7 +222,7 @@ impl LinearField {
     }
 }
 
-/// The name has a default, too.
+/// Makes `name` optional for the default field.
 fn receptive_fields(schema: &mut Schema) {
     let variants = schema.get_mut("oneOf").and_then(Value::as_array_mut);
     for variant in variants.into_iter().flatten() {
@@ -232,7 +232,7 @@ fn receptive_fields(schema: &mut Schema) {
     }
 }
 
-/// An entry of `encoding`: an encoder; or none, the stimulus as it is.
+/// An entry of `encoding`: an encoder, or `IdentityEncoding` for a stimulus without one.
 pub(super) fn entries(generator: &mut SchemaGenerator) -> Schema {
     let encoder = generator.subschema_for::<EncodingConfig>();
     json_schema!({

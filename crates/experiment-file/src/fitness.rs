@@ -1,6 +1,5 @@
-//! The fitness functions that a file may name: one row each in
-//! [`fitness_functions!`] below, from which the reader, the schema and the checks
-//! follow. What they compute is `sim-core`'s `fitness`.
+//! The fitness functions that a file may name: one row each in [`fitness_functions!`] below, from
+//! which the reader, the schema and the checks follow. `sim-core`'s `fitness` computes them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,8 +24,8 @@ parameters! {
     /// Constants of fitness functions.
     #[derive(Copy)]
     pub struct FitnessParams: Default {
-        /// alpha of the alpha shape whose border `identify_borderline` asks for, and
-        /// `world.border()` of scripts: circumradii are below the world's width / alpha.
+        /// alpha of the alpha shape whose border `identify_borderline` and `world.border()` of
+        /// scripts use: circumradii are below the world's width / alpha.
         alpha: f64 = positive(15.0).recent(),
         /// Distance to a light that counts as near in `goto_light`, cm.
         near: f64 = amount(80.0).recent(),
@@ -40,7 +39,7 @@ variants! {
 /// Steps at the start of an episode that `alignment` does not count.
 pub const ALIGNMENT_SETTLING_STEPS: u32 = 100;
 
-/// Declares the fitness functions, from one row each: its name in the file, and its requirements.
+/// Declares the fitness functions. Each has one row: its name in the file, and its requirements.
 macro_rules! fitness_functions {
     ($(
         $(#[doc = $doc:literal])*
@@ -57,7 +56,7 @@ macro_rules! fitness_functions {
         }
 
         impl FitnessFunction {
-            /// All of them.
+            /// All fitness functions.
             pub const ALL: &[Self] = &[$(Self::$function),*];
 
             /// Its name in the file.
@@ -78,7 +77,7 @@ macro_rules! fitness_functions {
 }
 
 fitness_functions! {
-    /// Experiment A: one robot, and the same one, has its LED on.
+    /// Experiment A: exactly one robot, and always the same, has its LED on.
     "identify_leader" = IdentifyLeader: [Need::OutputTo(ActuatorQuery::Led)],
     /// Experiment B: robots on the swarm's border have their LED on.
     "identify_borderline" = IdentifyBorderline: [Need::OutputTo(ActuatorQuery::Led)],

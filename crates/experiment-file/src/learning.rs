@@ -20,13 +20,14 @@ parameters! {
             Domain::Between(0.0, limits::PLASTIC_WEIGHT),
             Depends("10, of spiking neurons 1000"),
         ),
-        /// Coefficient of the product of both activities, where none evolves.
+        /// Coefficient of the product of both activities. A group whose coefficients evolve does
+        /// not use it.
         a as "A": f64 = between(COEFFICIENT, 1.0),
-        /// Coefficient of the postsynaptic activity, likewise.
+        /// Coefficient of the postsynaptic activity, used as `A` is.
         b as "B": f64 = between(COEFFICIENT, 0.0),
-        /// Coefficient of the presynaptic activity, likewise.
+        /// Coefficient of the presynaptic activity, used as `A` is.
         c as "C": f64 = between(COEFFICIENT, 0.0),
-        /// Constant term, likewise.
+        /// Constant term, used as `A` is.
         d as "D": f64 = between(COEFFICIENT, 0.0),
         /// Names of the plastic groups.
         synapses: Vec<String> = of(Domain::Names, Depends("all")),
@@ -44,7 +45,7 @@ parameters! {
     pub struct RewardConfig {
         /// Environment steps from the activities to the reward.
         delay: u32 = whole([1, limits::REWARD_DELAY], 30),
-        /// Factor of each reward against the one before.
+        /// Factor of each reward relative to the previous step's.
         discount: f64 = unit(0.9),
     }
 }

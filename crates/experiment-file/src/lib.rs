@@ -1,7 +1,6 @@
 //! The types of the experiment file, with every default filled in.
 //!
-//! [`ExperimentConfig::from_json`] reads one. It is strict, and it reports every
-//! problem of a file at once:
+//! [`ExperimentConfig::from_json`] reads a file strictly, and reports all of its problems at once:
 //!
 //! ```
 //! use evolution::ALGORITHMS;
@@ -116,7 +115,7 @@ pub use world::*;
 use read::Algorithms;
 use report::Report;
 
-/// A map whose order matters (of inputs, segments or robots).
+/// A map whose order matters, because it numbers inputs, genes or robots.
 pub type NamedMap<T> = indexmap::IndexMap<String, T>;
 
 /// A whole experiment: network, evolution, world.

@@ -41,10 +41,9 @@ pub const TRIALS: u32 = 1_000;
 pub const TRIALS_PER_GENERATION: u64 = 10_000_000;
 /// Genes per generation, over all individuals.
 pub const GENES_PER_GENERATION: u64 = 50_000_000;
-/// Genes of a genotype whose algorithm keeps a full covariance or shape matrix.
-/// There, a generation of 100 individuals takes the coordinator 0.5 s (CMA-ES) to
-/// 1 s (xNES), and a checkpoint has 10 to 20 MB; the time grows with the cube of
-/// the genes.
+/// Genes of a genotype whose algorithm keeps a full covariance or shape matrix. At this limit, a
+/// generation of 100 individuals takes the coordinator 0.5 s (CMA-ES) to 1 s (xNES), and a
+/// checkpoint has 10 to 20 MB. The time grows with the cube of the number of genes.
 pub const GENES_OF_FULL_MATRIX: u64 = 1_000;
 
 /// Euler steps of spiking networks, ms: the shortest time constants of their synapses and

@@ -17,7 +17,7 @@ use crate::{NamedMap, ParameterValue, Seed, limits};
 
 type Properties<'a> = IndexMap<&'a str, &'a Value<'a>>;
 
-/// A number as a whole number.
+/// The result of reading a whole number.
 enum Whole {
     Number(u64),
     /// Negative, or more than 64 bits.
@@ -146,8 +146,7 @@ impl<'a> Node<'a> {
         number.try_into().unwrap_or(*range.start())
     }
 
-    /// A whole number of 64 bits; or its digits as text, from programs that would round the
-    /// number.
+    /// A whole number of 64 bits. Programs that would round the number write its digits as text.
     pub(crate) fn seed(self) -> u64 {
         if !self.is_string() {
             return self.u64(0..=u64::MAX);
@@ -162,7 +161,7 @@ impl<'a> Node<'a> {
         })
     }
 
-    /// A number within a range; messages name the range `POSITIVE` as positive.
+    /// A number within a range. Messages describe the range `POSITIVE` as "positive".
     pub(crate) fn number(self, range: RangeInclusive<f64>) -> f64 {
         let (min, max) = (*range.start(), *range.end());
         let is_positive = range == POSITIVE;
@@ -212,8 +211,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The variant of `T` that a string names. `unsupported`: names that
-    /// SpikeSwarmSim knows and this one does not.
+    /// The variant of `T` that a string names. `unsupported`: names that only SpikeSwarmSim knows.
     pub(crate) fn variant<T: Deserialize<'a>>(self, unsupported: &[&str]) -> Option<T> {
         let (report, path) = (self.report, self.path.clone());
         let name = self.string()?;
@@ -224,7 +222,7 @@ impl<'a> Node<'a> {
             .ok()
     }
 
-    /// A string in a notation of its own.
+    /// A string that `T` parses.
     pub(crate) fn parsed<T: FromStr<Err: ToString>>(self) -> Option<T> {
         let (report, path) = (self.report, self.path.clone());
         let parsed = self.string()?.parse();
@@ -401,7 +399,7 @@ impl<'a> Object<'a> {
         self.optional(key).map_or(default, read)
     }
 
-    /// An optional object; a missing one is read as an empty one.
+    /// An optional object. A missing object counts as an empty one.
     pub(crate) fn inner<T>(
         &mut self,
         key: &'static str,
@@ -419,7 +417,7 @@ impl<'a> Object<'a> {
         })
     }
 
-    /// Refuses keys by name that SpikeSwarmSim knows.
+    /// Refuses keys that only SpikeSwarmSim knows, as not supported.
     pub(crate) fn unsupported(&mut self, keys: &[&str]) {
         for key in keys {
             if self.properties.swap_remove(*key).is_some() {

@@ -105,9 +105,9 @@ pub enum SynapseSelector {
 /// The last part of `neurons:...:...` and of `synapses:delays:...`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum EnsembleSelector {
-    /// Every ensemble, and of delays every stimulus whose spikes have one.
+    /// Every ensemble; for delays, also every stimulus whose spikes have one.
     All,
-    /// One ensemble, or of delays a stimulus.
+    /// One ensemble; for delays, possibly a stimulus.
     Named(String),
 }
 
@@ -152,10 +152,10 @@ impl fmt::Display for GenotypeQuery {
 /// Why a text is not a query.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ParseQueryError {
-    /// The text names a part of SpikeSwarmSim that this one lacks.
+    /// The text names a part of SpikeSwarmSim that this simulator lacks.
     #[error("not supported: `{0}`")]
     Unsupported(String),
-    /// The text has another form.
+    /// The text does not have the form of a query.
     #[error(
         "expected `synapses:weights:NAME`, `synapses:delays:NAME`, `encoders:weights:NAME`, \
          `decoders:weights:NAME`, `learning:coefficients:NAME` or `neurons:PARAMETER:NAME`, with a \

@@ -1,4 +1,4 @@
-//! A robot: its controller, where it starts, and what goes wrong.
+//! A robot: its controller, its start, and its perturbations.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,13 +19,13 @@ pub struct RobotConfig {
     /// Number of robots.
     #[schemars(range(min = 1, max = limits::ROBOTS))]
     pub num_instances: u32,
-    /// What decides their actions.
+    /// The controller, which decides their actions.
     pub controller: RobotController,
     /// What they perceive.
     pub sensors: SensorsConfig,
     /// What they can do.
     pub actuators: ActuatorsConfig,
-    /// Where they start.
+    /// Start positions and headings.
     pub initializers: RobotInitializers,
     /// Faults and disturbances.
     pub perturbations: PerturbationsConfig,
@@ -56,11 +56,11 @@ parameters! {
     }
 }
 
-/// Start of a robot.
+/// Start of robots.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, transform = schema::optional("orientations"))]
 pub struct RobotInitializers {
-    /// Where they are at the start.
+    /// Start positions.
     pub positions: Initializer,
     /// Headings; default `random_uniform` over a full turn.
     pub orientations: Initializer,
@@ -71,13 +71,13 @@ parameters! {
     pub struct PerturbationsConfig: Default {
         /// Fault of a long-standing leader.
         leader_failure: Option<LeaderFailureConfig> = optional(LeaderFailureConfig::OBJECT),
-        /// Zeroed stimuli; the robots of each are drawn by themselves. One alone is written
-        /// without a list around it.
+        /// Stimuli that become zero. Each has its own draw of robots. A single stimulus needs no
+        /// list.
         stimuli_inhibition: Vec<StimuliInhibitionConfig> =
             of(Domain::Objects(StimuliInhibitionConfig::OBJECT, limits::INHIBITIONS), Null),
         /// Redrawn positions.
         topology_switch: Option<TopologySwitchConfig> = optional(TopologySwitchConfig::OBJECT),
-        /// Robots that turn by themselves.
+        /// Robots that turn, whatever their controller decides.
         uncontrollable_rotation: Option<UncontrollableRotationConfig> =
             optional(UncontrollableRotationConfig::OBJECT),
     }
@@ -91,9 +91,9 @@ parameters! {
 
     /// Some robots, drawn anew each trial, lose a stimulus.
     pub struct StimuliInhibitionConfig {
-        /// Which reading becomes zero.
+        /// The reading that becomes zero.
         stimuli: InhibitedStimulus = of(Domain::Variant(INHIBITED), Name("light_sensor")),
-        /// How many robots.
+        /// Number of affected robots.
         affected_robots: u32 = of(Domain::WholeOrAll(limits::ROBOTS), Depends("all")),
     }
 
@@ -105,7 +105,7 @@ parameters! {
 
     /// Some robots turn to a target heading and hold it.
     pub struct UncontrollableRotationConfig {
-        /// How many robots, drawn anew each trial.
+        /// Number of affected robots, drawn anew each trial.
         affected_robots: u32 = of(Domain::WholeOrAll(limits::ROBOTS), Depends("all")),
         /// First affected step.
         start: u32 = whole([0, limits::STEPS], 200).original(Whole(101)),
@@ -114,8 +114,8 @@ parameters! {
             .shown("270, 90, 15 and 180 degrees"),
         /// Step at which the next target applies.
         switch_at: u32 = whole(STEPS, 600),
-        /// Action of the right wheel while they turn, that of the left being its negative.
-        /// With 0.1 and the default wheels, half a turn takes 50 steps.
+        /// Action of the right wheel during a turn; the left wheel gets its negative. With 0.1 and
+        /// the default wheels, half a turn takes 50 steps.
         speed: f64 = unit(0.1).original(Number(0.3)),
     }
 }

@@ -27,7 +27,7 @@ pub(super) fn filled_in(_: &mut SchemaGenerator) -> Schema {
     json_schema!({})
 }
 
-/// The keys in a list such as "a, b": attributes take no array.
+/// Splits a list of keys such as "a, b", because attributes cannot contain arrays.
 pub(super) fn split(keys: &'static str) -> impl Iterator<Item = &'static str> {
     keys.split(", ")
 }
@@ -128,7 +128,7 @@ pub(super) fn map<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
     })
 }
 
-/// The neuron model may stand in a form of its own.
+/// Adds `neurons`, another form of the neuron model.
 pub(super) fn with_neurons(schema: &mut Schema) {
     add_property(schema, "neurons", neurons());
 }
@@ -163,8 +163,8 @@ pub(super) fn script(_: &mut SchemaGenerator) -> Schema {
         {
             "type": "object",
             "properties": {
-                "name": {"type": "string", "description": "Name of its file."},
-                "text": {"type": "string", "description": "Its whole text, at most 32 KiB."},
+                "name": {"type": "string", "description": "Name of the script's file."},
+                "text": {"type": "string", "description": "The whole script, at most 32 KiB."},
             },
             "required": ["name", "text"],
             "additionalProperties": false,
@@ -190,7 +190,7 @@ pub(super) fn semantics() -> Value {
     json!({
         "enum": ["thesis", "original"],
         "default": "thesis",
-        "description": "Whose defaults the file has for keys that it leaves out: those of the \
+        "description": "The defaults of keys that the file leaves out: those of the \
                         thesis, or those of SpikeSwarmSim.",
     })
 }
@@ -200,7 +200,9 @@ fn neurons() -> Value {
     json!({
         "type": "object",
         "description": "The neuron model in another form, in place of `neuron_model`.",
-        "properties": {"model": {"enum": NeuronModel::names(), "description": "Its name."}},
+        "properties": {
+            "model": {"enum": NeuronModel::names(), "description": "Name of the neuron model."},
+        },
         "required": ["model"],
         "additionalProperties": false,
     })

@@ -7,8 +7,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 /// Largest seed that is a number in JSON, because JavaScript and jq round larger ones.
 const NUMBER_MAX: u64 = 1 << 53;
 
-/// A seed in JSON answers and files of results. From 2^53 + 1 on, it is written as text of
-/// digits; both forms are read.
+/// A seed in JSON answers and files of results. Seeds from 2^53 + 1 on are written as a text of
+/// digits. Both forms can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Seed(pub u64);
 

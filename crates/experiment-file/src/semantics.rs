@@ -1,17 +1,17 @@
-//! `semantics`: chooses the defaults of omitted keys. SpikeSwarmSim's defaults are those
-//! that tables of parameters call `original`. Every such key can be given alone, too;
-//! `docs/fidelity.md` explains each.
+//! `semantics`: chooses the defaults of omitted keys. Tables of parameters call SpikeSwarmSim's
+//! defaults `original`. A file may also state each such key itself; `docs/fidelity.md` explains
+//! them.
 
 use serde::Deserialize;
 
 use super::{Parameters, parameters};
 
-/// The source of defaults for omitted keys. It is not part of an experiment, because the
+/// The source of defaults for omitted keys. The source is not part of an experiment, because the
 /// canonical form contains the values.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Semantics {
-    /// The thesis's.
+    /// Those of the thesis.
     #[default]
     Thesis,
     /// Those of the thesis's Python simulator.

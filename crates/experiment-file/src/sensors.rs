@@ -1,7 +1,7 @@
-//! The sensors of robots: one row per kind of sensor in [`sensors!`] below, from which the key in
-//! files, the readings that stimuli may name, their checks and the budget follow; then the
-//! parameters of each kind, in `parameters!`. For each row but the radio's, `sim-core` has a function
-//! of that name, which makes the sensor that computes the reading.
+//! The sensors of robots. [`sensors!`] below has one row per kind of sensor. The key in files, the
+//! readings that stimuli may name, their checks and the budget follow from the row. `parameters!`
+//! then declares the parameters of each kind. For each row except the radio's, `sim-core` has a
+//! function of that name, which makes the sensor that computes the reading.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use crate::DefaultValue::{Name, Number, Required, Whole};
 use crate::parameters::{Also, parameters, variants};
 use crate::{Domain, limits};
 
-/// Sensors of SpikeSwarmSim that this one lacks.
+/// Sensors of SpikeSwarmSim that this simulator lacks.
 pub(crate) const UNSUPPORTED: [&str; 1] = ["neighbors_state_sensor"];
 
 /// Readings that are refused by name.
@@ -27,10 +27,10 @@ pub(crate) const UNSUPPORTED_READINGS: &[&str] = &[
     "wireless_receiver:sender",
 ];
 
-/// From a row per kind of sensor: its key in `sensors` and the type of its
-/// parameters; the sectors in which every other robot and every light may be, which are
-/// what a robot's sensor costs per step, for the budget of an episode; then its readings,
-/// each with its name in the file and its length. `$dollar` is `$`, for the macro that it makes.
+/// Declares the sensors, from one row per kind: its key in `sensors`; the type of its parameters;
+/// its number of sectors, by which the budget multiplies the number of robots and lights; and its
+/// readings, each with its name in files and its length. `$dollar` is `$`, for the macro that this
+/// one makes.
 macro_rules! sensors {
     ($dollar:tt $(
         $(#[doc = $sensor_doc:literal])*
@@ -97,7 +97,7 @@ macro_rules! sensors {
         }
 
         impl SensorQuery {
-            /// All of them.
+            /// All readings.
             pub const ALL: &[Self] = &[$($(Self::$query,)*)*];
 
             /// Its name in the file.
@@ -156,27 +156,27 @@ sensors! { $
         /// 1 on a nest; 1 value.
         "nest_sensor" = Nest: |_| 1,
     }
-    /// Whether the robot carries something, as the function `react` of a script says.
+    /// Whether the robot carries something, which the function `react` of a script decides.
     food_sensor: PlainSensorConfig, seen: |_| 0, {
         /// 1 while the robot carries something; 1 value.
         "food_sensor" = Food: |_| 1,
     }
-    /// Where the robot is.
+    /// Position of the robot.
     own_position_sensor: PlainSensorConfig, seen: |_| 0, {
         /// x and y, cm; 2 values.
         "own_position_sensor" = OwnPosition: |_| 2,
     }
-    /// Where the robot looks.
+    /// Heading of the robot.
     own_orientation_sensor: PlainSensorConfig, seen: |_| 0, {
         /// Heading, in turns from 0 to 1; 1 value.
         "own_orientation_sensor" = OwnOrientation: |_| 1,
     }
-    /// Where the nearest robots are and look.
+    /// Positions and headings of the nearest robots.
     neighborhood_pos_sensor: NeighborhoodSensorConfig, seen: |sensor| sensor.n_neighbors, {
         /// x and y, cm, and heading, radians, of the nearest robots; 3 `n_neighbors` values.
         "neighborhood_pos_sensor" = NeighborhoodPos: |sensor| 3 * sensor.n_neighbors,
     }
-    /// What the function `sense` of a script says.
+    /// Numbers that the function `sense` of a script returns.
     // A script may look at everything for each of its numbers.
     script_sensor: ScriptSensorConfig, seen: |sensor| sensor.n, {
         /// The numbers that the function `sense` of the script returns; `n` values.
@@ -204,13 +204,13 @@ parameters! {
         range: f64 = positive(100.0),
         /// Components of a message, M.
         msg_length: u32 = whole([1, limits::MESSAGE_LENGTH], 2),
-        /// A frame of this many hops is not accepted any more.
+        /// Number of hops from which on the receiver ignores a frame.
         max_hops: u32 = whole([1, limits::HOPS], 10),
         /// Decay of a frame's strength with the distance, per cm.
         decay_rho: f64 = amount(0.05).original(Number(0.005)),
         /// Decay of a frame's strength with the angle, per radian.
         decay_phi: f64 = amount(1.0),
-        /// Whose sector the sending direction is.
+        /// The robot whose sector is the sending direction.
         sending_direction: SendingDirection =
             of(Domain::Variant(SendingDirection::VARIANTS), Name("emitter"))
             .original(Name("originator"))
@@ -223,9 +223,9 @@ parameters! {
     pub struct LightSensorConfig: Default {
         /// Number of sectors around the robot.
         n_sectors: u32 = whole(SECTORS, 6).original(Whole(2)),
-        /// Reach, cm. The light's own range bounds it too.
+        /// Reach, cm. The range of the light limits it, too.
         range: f64 = positive(80.0).original(Number(100.0)),
-        /// Colour it sees.
+        /// Colour that the sensor sees.
         color: String = text("red"),
         /// Decay with the distance, per cm.
         decay_rho: f64 = amount(0.05).original(Number(0.005)),
@@ -233,7 +233,7 @@ parameters! {
         decay_phi: f64 = amount(1.0),
         /// Variance of the Gaussian noise.
         noise_variance: f64 = amount(0.1).original(Number(0.0)).also(NOISE_SIGMA),
-        /// Largest angle between a sector's direction and what it sees, radians.
+        /// Largest angle between a sector's direction and an object that it sees, radians.
         aperture: f64 = between([1.0 / limits::MAGNITUDE, PI], PI)
             .shown("pi: every sector sees everything")
             .original_from(|params| {
@@ -242,8 +242,8 @@ parameters! {
             .recent(),
     }
 
-    /// Sees other robots. A sector has the largest exp(-decay_rho distance - decay_phi angle) of
-    /// them, with the angle between the robot and the sector's direction.
+    /// Sees other robots. The value of a sector is the largest exp(-decay_rho distance - decay_phi
+    /// angle) of them, with the angle between the robot and the sector's direction.
     pub struct DistanceSensorConfig: Default {
         /// Number of sectors around the robot.
         n_sectors: u32 = whole(SECTORS, 4).original(Whole(2)),
@@ -255,7 +255,7 @@ parameters! {
         decay_phi: f64 = amount(1.0),
         /// Variance of the Gaussian noise.
         noise_variance: f64 = amount(0.1).original(Number(0.0)).also(NOISE_SIGMA),
-        /// Largest angle between a sector's direction and what it sees, radians.
+        /// Largest angle between a sector's direction and an object that it sees, radians.
         aperture: f64 = between([1.0 / limits::MAGNITUDE, PI], PI)
             .shown("pi: every sector sees everything")
             .original_from(|params| PI / f64::from(params.of_key::<u32>("n_sectors")))
@@ -264,7 +264,7 @@ parameters! {
 
     /// Sees whether the robot stands on a ground area of one colour.
     pub struct GroundSensorConfig: Default {
-        /// Colour it sees.
+        /// Colour that the sensor sees.
         color: String = text("black"),
     }
 
@@ -290,15 +290,14 @@ parameters! {
     }
 }
 
-/// Of which robot the reading `wireless_receiver:sending_direction` gives the sector.
-/// The two differ for frames that were relayed.
+/// The robot whose sector the reading `wireless_receiver:sending_direction` gives. The two variants
+/// differ for relayed frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SendingDirection {
-    /// The robot that is heard: its sector that faces the listener (section 3.3.2).
+    /// The robot that the listener hears: the sector that faces the listener (section 3.3.2).
     Emitter,
-    /// The robot whose message it is: its sector that faced the first robot to hear
-    /// the message.
+    /// The robot that sent the message first: the sector that faced the first robot to hear it.
     Originator,
 }
 

@@ -1,4 +1,4 @@
-//! What synapses do to spiking neurons: at once, or through receptors that open and close.
+//! How synapses act on spiking neurons: at once, or through receptors that open and close.
 
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use crate::parameters::parameters;
 /// How spikes become currents.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum SynapseModel {
-    /// The weight, in the substep after the spike.
+    /// The current is the weight, in the substep after the spike.
     #[default]
     #[serde(rename = "static_synapse")]
     Static,
@@ -20,7 +20,7 @@ pub enum SynapseModel {
     Dynamic,
 }
 
-/// What the spikes of a group of dynamic synapses release.
+/// The neurotransmitter that the spikes of a group of dynamic synapses release.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Neurotransmitter {
     /// Excites for some milliseconds.
@@ -69,7 +69,7 @@ parameters! {
         gain: f64 = between(GAIN, 1.0),
         /// Time constant of the decay, ms.
         tau: f64 = between(TIME, 10.0),
-        /// Reversal potential, mV. With null, the current is negative whatever v.
+        /// Reversal potential, mV. With null, the current is negative for any v.
         reversal as "E": Option<f64> = between(VOLTAGE, -70.0).or_null(),
     }
 
@@ -84,14 +84,14 @@ parameters! {
         tau_decay: f64 = between(TIME, 100.0),
         /// Concentration of magnesium, mM. It blocks the receptors at low v.
         magnesium as "Mg2": f64 = between([0.0, 1_000.0], 0.5),
-        /// Reversal potential, mV. With null, the current depends on v by the block only.
+        /// Reversal potential, mV. With null, the current depends on v only through the block.
         reversal as "E": Option<f64> = between(VOLTAGE, 0.0).or_null(),
     }
 }
 
 const GAIN: [f64; 2] = [0.0, limits::SYNAPSE_GAIN];
 
-/// All may be left out, and the original spells NMDA `NDMA`.
+/// Makes all receptors optional, and adds `NDMA`, as the original spells NMDA.
 fn receptors(schema: &mut Schema) {
     schema.remove("required");
     let nmda = schema.pointer("/properties/NMDA").cloned();

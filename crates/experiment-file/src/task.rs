@@ -1,4 +1,4 @@
-//! `task`: what a swarm has to do, as a script that the file itself brings.
+//! `task`: the task of a swarm, as a script that the file itself contains.
 
 use std::ops::Range;
 

@@ -20,7 +20,7 @@ parameters! {
         time_scale: u32 = whole([1, limits::TIME_SCALE], 20),
         /// Seed of random connections, and of weights and delays that do not evolve.
         seed: u64 = of(Domain::Seed, Whole(821)),
-        /// How the neurons work. `ctrnn` is another name of `rate_model`.
+        /// How the neurons work. The name `ctrnn` means `rate_model`, too.
         neuron_model: NeuronModel =
             of(Domain::Variant(NeuronModel::VARIANTS), Name("rate_model")).recent(),
         /// Of rate neurons: whether the gain multiplies the bias, u = F(g (v + beta))
@@ -31,11 +31,11 @@ parameters! {
             of(Domain::Variant(InitialRates::VARIANTS), Name("activation"))
             .original(Name("zero"))
             .recent(),
-        /// Time constant of all rate neurons that an output reads, whatever the genotype
-        /// says, s.
+        /// Time constant of all rate neurons that an output reads, s. It replaces the time
+        /// constants of the genotype.
         motor_tau: Option<f64> = positive(0.0)
             .null()
-            .shown("null: that of the genotype")
+            .shown("null: the time constants of the genotype")
             .original(Number(0.5))
             .recent(),
         /// How spikes become currents.
@@ -50,12 +50,12 @@ parameters! {
         /// Inputs of the network, by names that you choose.
         stimuli: NamedMap<StimulusConfig> = required(schema::map::<StimulusConfig>);
         /// How stimuli become spikes. A stimulus without an entry, or with `IdentityEncoding`,
-        /// acts as it is.
+        /// reaches the network unencoded.
         encoding: NamedMap<EncodingConfig> =
             optional(encoding::entries) unless NamedMap::is_empty;
         /// Groups of neurons, by names that you choose. Their order numbers the neurons.
         ensembles: NamedMap<EnsembleConfig> = required(schema::map::<EnsembleConfig>);
-        /// Which ensemble drives which actuator.
+        /// The ensemble that drives each actuator, by names that you choose.
         outputs: NamedMap<OutputConfig> = required(schema::map::<OutputConfig>);
         /// Groups of synapses, by names that you choose. No two groups connect the same pair.
         synapses: NamedMap<SynapseGroupConfig> = required(schema::map::<SynapseGroupConfig>);
@@ -90,9 +90,9 @@ pub enum InitialRates {
 parameters! {
     /// An input of the network.
     pub struct StimulusConfig {
-        /// Number of values; equals the length of the reading.
+        /// Number of values, which must equal the length of the reading.
         n: u32 = of(Domain::Whole(1, limits::INPUTS), Required),
-        /// Where the values come from.
+        /// The reading that gives the values.
         sensor: SensorQuery = of(Domain::Variant(SensorQuery::VARIANTS), Required),
     }
 
@@ -100,11 +100,11 @@ parameters! {
     pub struct OutputConfig {
         /// Name of the ensemble.
         ensemble: String = of(Domain::Text, Required),
-        /// What it drives.
+        /// The actuator that the ensemble drives.
         actuator: ActuatorQuery = of(Domain::Variant(ActuatorQuery::VARIANTS), Required),
     }
     // Repeats a value of the decoding; nothing depends on it.
-    checked { Parameter::one_of("enc", &["real", "cat"], &[], "Without effect: the decoding says it") }
+    checked { Parameter::one_of("enc", &["real", "cat"], &[], "Without effect: the decoding determines it") }
 }
 
 variants! {
@@ -171,8 +171,8 @@ parameters! {
     }
     ignored { "ntx_fixed": "static synapses have no neurotransmitter"; }
     parts {
-        /// What spikes of dynamic synapses release: `AMPA`, `AMPA+NMDA` or `GABA`; default
-        /// `AMPA`. Static synapses ignore it. `AMPA+NDMA` is another name of `AMPA+NMDA`.
+        /// Neurotransmitter of dynamic synapses: `AMPA`, `AMPA+NMDA` or `GABA`; default `AMPA`.
+        /// Static synapses ignore it. `AMPA+NDMA` is another name of `AMPA+NMDA`.
         transmitter as "neuroTX": Option<Neurotransmitter> =
             optional(|_| json_schema!({})) unless Option::is_none;
     }
@@ -183,7 +183,8 @@ parameters! {
         n: u32 = of(Domain::Whole(1, limits::NEURONS), Required),
     }
     parts {
-        /// Activation function F of rate neurons; default `sigmoid`. It may stand in `params`, too.
+        /// Activation function F of rate neurons; default `sigmoid`. Files may also state it in
+        /// `params`.
         activation: Option<Activation> =
             optional(|generator| generator.subschema_for::<Activation>()) unless Option::is_none;
         /// Parameters of the neuron model that no query of the genotype covers, by name.
@@ -206,33 +207,35 @@ kinds! {
         } = "ThresholdDecoding",
         /// One category, drawn from softmax(u), for an LED of several colours.
         SoftmaxDecoding {} = "SoftmaxDecoding",
-        /// One category, the index of the neuron that spiked first, for an LED of several colours or
-        /// a mode. The lowest index wins a tie, and it is 0 if no neuron spiked.
-        FirstToSpike {} ignored("num_outputs": "there are as many as neurons") = "FirstToSpike",
+        /// One category, the index of the neuron that spiked first, for an LED of several colours
+        /// or a mode. The lowest index wins a tie. If no neuron spiked, the category is 0.
+        FirstToSpike {} ignored("num_outputs": "the number of neurons determines it") = "FirstToSpike",
         /// Sum over neurons of weight * spikes * 0.25^rank. The rank of a neuron is the number of
-        /// neurons whose first spike came before its own.
+        /// neurons that spiked before its first spike.
         RankOrderDecoding {
-            /// Values that it yields, each with weights of its own: 1 or 2 for wheels, 1 for an LED
-            /// or a mode, which is on from 0.5, and `msg_length` for a message.
+            /// Number of values that the decoding yields, each with its own weights: 1 or 2 for
+            /// wheels, 1 for an LED or a mode (on if the value is at least 0.5), and `msg_length`
+            /// for a message.
             num_outputs: u32 = whole([1, limits::MESSAGE_LENGTH], 1),
         } = "RankOrderDecoding",
-        /// sigmoid(3 W a) + rest_value - 0.5, where a follows each neuron's spikes: it rises
-        /// within 5 ms of a spike and decays with 30 ms. One neuron alone decides nothing with
-        /// the default `rest_value`: give an LED two.
+        /// sigmoid(3 W a) + rest_value - 0.5, where a follows each neuron's spikes: it rises within
+        /// 5 ms of a spike and decays with a time constant of 30 ms. With the default `rest_value`,
+        /// a single neuron cannot switch an LED: give it two.
         LinearPopulationDecoding {
-            /// Values that it yields, each with weights of its own: 1 or 2 for wheels, 1 for an LED
-            /// or a mode, which is on from 0.5, and `msg_length` for a message.
+            /// Number of values that the decoding yields, each with its own weights: 1 or 2 for
+            /// wheels, 1 for an LED or a mode (on if the value is at least 0.5), and `msg_length`
+            /// for a message.
             num_outputs: u32 = whole([1, limits::MESSAGE_LENGTH], 1),
-            /// The value that it yields where W a = 0.
+            /// The value that the decoding yields where W a = 0.
             rest_value: f64 = between([-1.0, 1.0], 0.5),
         } = "LinearPopulationDecoding",
     }
     // Repeats a value of the scheme; nothing depends on it.
-    checked { Parameter::switch("is_cat", false, "Without effect: the scheme says it") }
+    checked { Parameter::switch("is_cat", false, "Without effect: the scheme determines it") }
 }
 
 impl DecodingConfig {
-    /// Whether it decodes spikes, not activities.
+    /// Whether the decoding reads spikes instead of activities.
     pub fn is_of_spikes(self) -> bool {
         use DecodingConfig::{FirstToSpike, LinearPopulationDecoding, RankOrderDecoding};
         matches!(self, FirstToSpike {} | RankOrderDecoding { .. } | LinearPopulationDecoding { .. })

@@ -41,7 +41,7 @@ pub enum ObjectConfig {
 }
 
 impl ObjectConfig {
-    /// How many of them there are.
+    /// Number of objects.
     pub fn num_instances(&self) -> u32 {
         match self {
             Self::Robot(robot) => robot.num_instances,
@@ -78,10 +78,10 @@ kinds! {
         } = "random_circumference",
         /// A connected, compact random geometric graph.
         RandomGraph {
-            /// Scale of the graph, cm. Beyond half of it from the centre, steps turn
-            /// tangential.
+            /// Scale of the graph, cm. At more than half this distance from the centre, steps
+            /// become tangential.
             max_rad: f64 = positive(300.0),
-            /// Place of the first robot and centre of the graph, cm.
+            /// Position of the first robot and centre of the graph, cm.
             initial_pos: [f64; 2] = of(Domain::Numbers(2, 2), Depends(CENTRE)),
         } = "random_graph",
     }
@@ -102,7 +102,7 @@ pub struct LightSourceConfig {
     pub num_instances: u32,
     /// How they move; default null: they stand still.
     pub controller: LightController,
-    /// Where they start.
+    /// Start positions.
     pub initializers: PositionInitializers,
     /// Reach and colour.
     pub params: LightParams,
@@ -115,11 +115,11 @@ kinds! {
         Static {} = "static",
         /// Circles the centre of the world (Eq. 5.7-5.8).
         LightOrbitController(OrbitConfig) = "light_orbit_controller",
-        /// Flees from robots within 150 cm, 3 cm per step, until one is within 30 cm.
+        /// Flees from robots within 150 cm, by 3 cm per step, until a robot is within 30 cm.
         LightPreyController {} = "light_prey_controller",
         /// Goes to random targets (section 6.4).
         LightRndPosController(RandomTargetsConfig) = "light_rnd_pos_controller",
-        /// As the function `move` of the script of `task` says.
+        /// The function `move` of the script of `task` moves it.
         ScriptController {} = "script_controller",
     }
 }
@@ -130,13 +130,13 @@ parameters! {
     pub struct OrbitConfig: Default {
         /// Angle per step, radians.
         angle_step: f64 = amount(0.01).original(Number(0.013)).recent(),
-        /// What the radius grows by per step, cm.
+        /// Growth of the radius per step, cm.
         radius_step: Option<f64> = positive(0.0)
             .null()
-            .shown("null: a fiftieth of what it lacks (Eq. 5.7)")
+            .shown("null: a fiftieth of the missing length (Eq. 5.7)")
             .original(Number(1.0))
             .recent(),
-        /// Radius in the end, cm.
+        /// Final radius, cm.
         radius: f64 = amount(200.0).recent(),
     }
 
@@ -145,11 +145,13 @@ parameters! {
     pub struct RandomTargetsConfig: Default {
         /// Period at which the target is drawn anew, steps.
         every: u32 = whole([1, limits::STEPS], 50),
-        /// Side of the square around the centre of the world that targets are drawn from, cm.
+        /// Side of the square from which targets are drawn, cm. Its centre is the centre of the
+        /// world.
         square: f64 = amount(200.0).recent(),
-        /// Way per step, cm. The light passes its target and turns back.
+        /// Distance per step, cm. The light passes its target and turns back.
         speed: Option<f64> = amount(3.0),
-        /// alpha of Eq. 6.4: share of the remaining way covered per step, instead of `speed`.
+        /// alpha of Eq. 6.4: share of the remaining distance that the light covers per step. It
+        /// replaces `speed`.
         step: Option<f64> = of(Domain::Between(0.0, 1.0), Null).instead_of("speed"),
     }
 
@@ -160,7 +162,7 @@ parameters! {
         /// Colour, which sensors of the same colour see.
         color: String = text("red"),
     }
-    ignored { "static": "`controller` says how a light moves"; }
+    ignored { "static": "`controller` determines how a light moves"; }
 
     /// Physical properties of a ground area.
     pub struct GroundAreaParams: Default {
@@ -181,7 +183,7 @@ parameters! {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, transform = schema::ignored("orientations"))]
 pub struct PositionInitializers {
-    /// Where they are at the start.
+    /// Start positions.
     pub positions: Initializer,
 }
 
@@ -199,7 +201,7 @@ pub struct GroundAreaConfig {
     /// How they move; default null: they do not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controller: Option<AreaController>,
-    /// Where they start.
+    /// Start positions.
     pub initializers: PositionInitializers,
     /// Radius and colour.
     pub params: GroundAreaParams,
@@ -209,6 +211,6 @@ pub struct GroundAreaConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AreaController {
-    /// As the function `move` of the script of `task` says.
+    /// The function `move` of the script of `task` moves it.
     ScriptController,
 }

@@ -19,7 +19,7 @@ pub(super) fn check(
 
 /// Numbers that a worker keeps for a node of an encoder, in addition to one per substep.
 const STATES_PER_NODE: u64 = 8;
-/// Operations of a node of an encoder in a substep, as many as for a random draw.
+/// Operations of an encoder's node in a substep: a random draw costs as many.
 const OPERATIONS_PER_NODE: u64 = 16;
 
 struct NetworkSize {

@@ -16,18 +16,18 @@ pub(super) struct ParameterCoverage<'a> {
 
 struct Part<'a> {
     kind: PartKind<'a>,
-    /// The query that covers it and its population.
+    /// The query that covers the part, and the query's population.
     owner: Option<(&'a GenotypeQuery, &'a str)>,
 }
 
 /// A part of the network that a query covers completely or not at all.
 #[derive(Clone, Copy)]
 enum PartKind<'a> {
-    /// The weights of a group's synapses from one of its names.
+    /// The weights of the synapses of a group that start from `pre`.
     Weights { group: &'a str, pre: &'a str, source: Source },
     /// A parameter of an ensemble's neurons.
     Neurons { parameter: &'static str, ensemble: &'a str },
-    /// The delays of an ensemble's axons, or of an encoded stimulus's.
+    /// The axonal delays of an ensemble or of an encoded stimulus.
     Delays { source: &'a str },
     /// The weights of a stimulus's receptive field.
     Encoder { stimulus: &'a str },
@@ -236,7 +236,7 @@ impl fmt::Display for PartKind<'_> {
                 write!(f, "the weights of the receptive field of `{stimulus}`")
             }
             Self::Learning { group } => {
-                write!(f, "the coefficients of the learning of group `{group}`")
+                write!(f, "the learning coefficients of group `{group}`")
             }
             Self::Decoder { output } => write!(f, "the weights of the decoding of `{output}`"),
         }

@@ -1,5 +1,5 @@
-//! Checks the genotype: its queries match something, and nothing twice; their bounds; the
-//! operators.
+//! Checks the genotype: every query matches something, no two queries match the same part, and
+//! bounds and operators are valid.
 
 use crate::report::{Path, Report};
 use crate::{

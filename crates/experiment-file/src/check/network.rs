@@ -70,7 +70,7 @@ fn inputs(topology: &TopologyConfig, report: &Report<'_>) {
     for stimulus in topology.stimuli.keys().filter(|stimulus| !is_used(stimulus)) {
         report.warning(
             &path.key(stimulus),
-            "no synapse group starts from it: the network does not get it",
+            "no synapse group starts from this stimulus: the network does not receive it",
         );
     }
 }
@@ -105,7 +105,7 @@ fn source_names(topology: &TopologyConfig) -> impl Iterator<Item = &str> {
     topology.ensembles.keys().chain(topology.stimuli.keys()).map(String::as_str)
 }
 
-/// The indices of names in `known`, which is a beginning of [`source_names`].
+/// The indices of names in `known`, which is a prefix of [`source_names`].
 fn resolve(
     names: &[String],
     known: &[&str],
@@ -137,7 +137,7 @@ fn resolve(
     found
 }
 
-/// Outputs connect ensembles to actuators, no two to the same one.
+/// Outputs connect ensembles to actuators, and no two outputs drive the same actuator.
 fn outputs(topology: &TopologyConfig, report: &Report<'_>) {
     let ensembles: Vec<&String> = topology.ensembles.keys().collect();
     let mut drivers: BTreeMap<ActuatorQuery, &str> = BTreeMap::new();
@@ -211,10 +211,8 @@ fn accepts(actuator: ActuatorQuery, decoding: DecodingConfig, n: u32) -> Result<
     {
         return match (actuator, num_outputs) {
             (Message, _) | (Wheels, 1 | 2) | (Led | Mode, 1) => Ok(()),
-            (Wheels, _) => {
-                Err(format!("the actuator needs 1 or 2 outputs, these are {num_outputs}"))
-            }
-            (Led | Mode, _) => Err(format!("the actuator needs 1 output, these are {num_outputs}")),
+            (Wheels, _) => Err(format!("the actuator needs 1 or 2 outputs, not {num_outputs}")),
+            (Led | Mode, _) => Err(format!("the actuator needs 1 output, not {num_outputs}")),
         };
     }
     let (sizes, expected) = match (actuator, decoding) {

@@ -47,7 +47,7 @@ fn evolvable_object(config: &ExperimentConfig, report: &Report<'_>) {
             if robot.controller == RobotController::ScriptController {
                 return report.warning(&object_path.key("controller"), || {
                     format!(
-                        "the script controls `{name}`, whatever its genotype: it can be \
+                        "the script controls `{name}`, whatever the genotype: `{name}` can be \
                          evaluated, but it does not evolve"
                     )
                 });
@@ -64,7 +64,7 @@ fn evolvable_object(config: &ExperimentConfig, report: &Report<'_>) {
     report.conflict(&path, &[&object_path], || format!("`{name}` {problem}"));
 }
 
-/// The experiment has what the fitness function needs.
+/// Checks that the experiment meets the requirements of the fitness function.
 fn fitness(config: &ExperimentConfig, report: &Report<'_>) {
     let path = Path::from(["algorithm", "fitness_function"]);
     let function = config.algorithm.fitness_function;
@@ -111,7 +111,7 @@ fn fitness(config: &ExperimentConfig, report: &Report<'_>) {
     }
 }
 
-/// The names of a map's entries, and one key of each.
+/// The place of a map's keys, and the places of one key in all of its entries.
 fn each<T>(path: &Path, entries: &NamedMap<T>, key: &str) -> Vec<Path> {
     let of_entries = entries.keys().map(|name| path.key(name).key(key));
     of_entries.chain([path.keys()]).collect()

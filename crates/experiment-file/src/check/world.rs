@@ -131,7 +131,7 @@ fn network_ports(
     }
 }
 
-/// The vehicle turns light into motion without a network.
+/// A Braitenberg vehicle turns light into motion without a network.
 fn braitenberg_ports(robot: &RobotConfig, path: &Path, report: &Report<'_>) {
     let path = |key| (path.key("controller"), path.key(key));
     if robot.sensors.light_sensor.is_none() {

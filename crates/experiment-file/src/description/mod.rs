@@ -1,9 +1,9 @@
-//! How an evolutionary algorithm describes itself to the experiment file.
+//! Descriptions of evolutionary algorithms, for experiment files.
 //!
 //! An algorithm states its name, its parameters with their domains and defaults, and its limits
-//! once, as an [`AlgorithmDescription`], next to its code in the crate `evolution`. The reader,
-//! the JSON Schema, the checks, `docs/keys.md` and the table in `docs/algorithms.md` follow from the list of
-//! descriptions, which is an argument of
+//! once, as an [`AlgorithmDescription`], next to its code in the crate `evolution`. The reader, the
+//! JSON Schema, the checks, `docs/keys.md` and the table in `docs/algorithms.md` follow from the
+//! list of descriptions, which is an argument of
 //! [`ExperimentConfig::from_json`](crate::ExperimentConfig::from_json). So this crate knows no
 //! algorithm, and programs that only simulate need none.
 
@@ -25,13 +25,13 @@ pub struct AlgorithmDescription {
     /// Number of values that it keeps between generations, as a formula in the genes d and the
     /// individuals P.
     pub state: &'static str,
-    /// The order of that number, for estimates of memory.
+    /// The largest part of that state, for estimates of memory.
     pub keeps: Keeps,
     /// Fewest individuals per generation, at least 1.
     pub individuals_min: u32,
     /// The way in which it learns from the individuals of a generation.
     pub learns_from: LearnsFrom,
-    /// Most genes of all populations together; `None`: no limit of its own.
+    /// Most genes of all populations together; `None` if the algorithm has no such limit.
     pub genes_max: Option<u64>,
     /// In the order of the canonical form.
     pub parameters: &'static [Parameter],
@@ -72,14 +72,14 @@ impl AlgorithmDescription {
         match population_size {
             0 => None,
             1 => Some(format!(
-                "with a single individual, {name} never learns, as there is nobody to compare it \
-                 with; take {FEW_INDIVIDUALS} individuals or more"
+                "with a single individual, {name} never learns, because it compares \
+                 individuals; take {FEW_INDIVIDUALS} individuals or more"
             )),
             size if size < FEW_INDIVIDUALS => Some(format!(
                 "{size} individuals teach {name} next to nothing; take {FEW_INDIVIDUALS} or more"
             )),
             size if self.learns_from == LearnsFrom::Pairs && size % 2 == 1 => Some(format!(
-                "{name} draws individuals in pairs, and of {size} the last one is the mean itself, \
+                "{name} draws individuals in pairs; the last one of {size} is the mean itself, \
                  which teaches nothing; take {} or {}",
                 size - 1,
                 size + 1

@@ -29,8 +29,8 @@ pub(crate) fn describe_algorithms(schema: &mut Value, algorithms: &[AlgorithmDes
     // The parameters may stand in the population itself, too.
     if let Value::Object(population) = population {
         for (key, mut value) in algorithms.iter().flat_map(properties) {
-            // The first description is that of the genetic algorithm, which uses all these keys.
-            // The other algorithms ignore them, so they accept any value.
+            // The first description describes the genetic algorithm, which uses all these keys. The
+            // other algorithms ignore them, so they accept any value.
             if GENETIC_KEYS.contains(&key.as_str()) {
                 value = json!({"description": value["description"]});
             }

@@ -18,7 +18,7 @@ pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
             "",
             5.0,
             [-1_000.0, 1_000.0],
-            "What a spike adds to w, per ms of the step",
+            "Increase of w by a spike, per ms of the step",
         ),
         NeuronParameter::linear("theta_rest", "mV", -45.0, VOLTAGE, "Threshold long after a spike"),
     ],

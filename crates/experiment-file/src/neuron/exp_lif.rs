@@ -20,7 +20,7 @@ pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
             "mV",
             -40.0,
             VOLTAGE,
-            "Where the upswing of a spike begins",
+            "Voltage at which the upswing of a spike begins",
         ),
         NeuronParameter::refractory_substeps(10),
     ],

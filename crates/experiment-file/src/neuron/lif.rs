@@ -1,5 +1,5 @@
-//! Leaky integrate and fire: tau dv/dt = v_rest - v + R I, a spike where v reaches
-//! thresh, after which v is v_rest. Without current for `time_refrac` substeps.
+//! Leaky integrate and fire: tau dv/dt = v_rest - v + R I, a spike where v reaches thresh, after
+//! which v is v_rest. For `time_refrac` substeps after a spike, the neuron takes no current.
 
 use super::{NeuronModelSpec, NeuronParameter, VOLTAGE};
 

@@ -23,7 +23,7 @@ use serde_json::json;
 use super::{Activation, NamedMap};
 use crate::{Domain, Parameter, ParameterValue, Variants, parameters};
 
-/// How the neurons of a network work: one model for all of them.
+/// How the neurons of a network work; all of them have the same model.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum NeuronModel {
     /// Continuous-time recurrent neural network of rate neurons (CTRNN).
@@ -85,7 +85,7 @@ pub enum GeneScale {
     Linear,
     /// `factor` * 10^number.
     PowerOfTen {
-        /// The value for 0.
+        /// The value that 0 stands for.
         factor: f64,
     },
 }
@@ -158,8 +158,8 @@ impl NeuronModelSpec {
     }
 }
 
-/// Every parameter that a query can name, of all models; a name that several models
-/// use, once.
+/// Every parameter that a query can name, of all models. A name that several models share appears
+/// once.
 pub(super) fn evolvable_parameters() -> Vec<&'static NeuronParameter> {
     let mut found: Vec<&NeuronParameter> = Vec::new();
     for parameter in NeuronModel::ALL.iter().flat_map(|model| model.spec().evolvable()) {
@@ -222,7 +222,7 @@ impl JsonSchema for NeuronModel {
     }
 }
 
-/// Schema of an ensemble's `params`: those of one of the models.
+/// Schema of an ensemble's `params`: the parameters of one of the models.
 pub(super) fn params_schema(generator: &mut SchemaGenerator) -> Schema {
     let activation = generator.subschema_for::<Activation>();
     let of_model = |model: NeuronModel| {
@@ -244,7 +244,7 @@ pub(super) fn params_schema(generator: &mut SchemaGenerator) -> Schema {
 }
 
 impl NeuronParameter {
-    /// A parameter that evolves on the scale of its values, for the table of a model.
+    /// A parameter that evolves, whose genes are on the scale of its values.
     const fn linear(
         name: &'static str,
         unit: &'static str,
@@ -268,7 +268,7 @@ impl NeuronParameter {
 
     /// The substeps after a spike in which a neuron takes no current.
     const fn refractory_substeps(default: u32) -> Self {
-        let meaning = "Substeps after a spike without current";
+        let meaning = "Substeps after a spike in which the neuron takes no current";
         let parameter = Parameter::whole("time_refrac", [0, 1_000], default, meaning);
         Self { parameter, aliases: &[], gene: None, is_time_constant: false }
     }
@@ -278,7 +278,7 @@ impl NeuronParameter {
         self.parameter.key
     }
 
-    /// Its value where neither the file nor a gene gives one.
+    /// Its value if neither the file nor a gene states one.
     pub fn default(&self) -> f64 {
         self.parameter.default.value().and_then(|value| value.number()).unwrap_or_default()
     }

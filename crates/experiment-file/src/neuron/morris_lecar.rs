@@ -1,5 +1,5 @@
-//! Morris and Lecar 1981, with currents of a leak, of potassium and of calcium. A spike in
-//! every substep that ends at 35.5 mV or more.
+//! Morris and Lecar 1981, with currents of a leak, of potassium and of calcium. The neuron spikes
+//! in every substep that ends at 35.5 mV or more.
 
 use super::{NeuronModelSpec, NeuronParameter, TIME, VOLTAGE};
 
@@ -23,7 +23,7 @@ pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
             VOLTAGE,
             "Voltage at which half of the calcium channels are open",
         ),
-        NeuronParameter::linear("V2", "mV", 18.0, WIDTH, "Width of that curve"),
+        NeuronParameter::linear("V2", "mV", 18.0, WIDTH, "Width of the curve around `V1`"),
         NeuronParameter::linear(
             "V3",
             "mV",
@@ -31,7 +31,7 @@ pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
             VOLTAGE,
             "Voltage at which half of the potassium channels are open",
         ),
-        NeuronParameter::linear("V4", "mV", 17.4, WIDTH, "Width of that curve"),
+        NeuronParameter::linear("V4", "mV", 17.4, WIDTH, "Width of the curve around `V3`"),
         NeuronParameter::linear("E_Ca", "mV", 120.0, VOLTAGE, "Reversal potential of calcium"),
         NeuronParameter::linear("E_K", "mV", -84.0, VOLTAGE, "Reversal potential of potassium"),
         NeuronParameter::linear("E_L", "mV", -60.0, VOLTAGE, "Reversal potential of the leak"),

@@ -1,5 +1,5 @@
-//! Types whose variants have parameters each: in a file, an object of the name of the variant
-//! and of `params`.
+//! Types whose variants each have parameters. In a file, a value of such a type is an object with
+//! the name of the variant and its `params`.
 
 use schemars::{Schema, SchemaGenerator, json_schema};
 use serde::Serializer;
@@ -11,17 +11,17 @@ use super::{Params, Table, object};
 use crate::node;
 use crate::semantics::Semantics;
 
-/// A type whose variants have parameters each.
+/// A type whose variants each have parameters.
 pub trait Kinds: Sized {
     /// The key of the variant's name.
     const TAG: &'static str;
     /// The variants.
     const KINDS: &'static [Kind];
 
-    /// The variant of a name with its parameters, all of which are there.
+    /// The variant of this name. `params` has all of its parameters.
     fn from_params(name: &str, params: &Params) -> Option<Self>;
 
-    /// The name, and the parameters as far as the canonical form has them.
+    /// The name of the variant, and its parameters in the canonical form.
     fn to_params(&self) -> (&'static str, Params);
 }
 
@@ -30,21 +30,21 @@ pub trait Kinds: Sized {
 pub struct Kind {
     /// Its name.
     pub name: &'static str,
-    /// What it is, in sentences.
+    /// Its description, in sentences.
     pub meaning: &'static str,
     /// Its parameters.
     pub table: Table,
-    /// Describes their type, if they have one of their own.
+    /// The schema of the type of the parameters, if they have a type of their own.
     pub(crate) schema: &'static [fn(&mut SchemaGenerator) -> Schema],
 }
 
-/// Which variants a place takes.
+/// The variants that a place in a file accepts.
 pub(crate) struct Choice<'a> {
     /// Their names.
     pub names: Vec<&'static str>,
     /// Names of SpikeSwarmSim that are refused as not supported.
     pub unsupported: &'a [&'a str],
-    /// The one of a file that names none; none: it has to.
+    /// The variant if the file names none; `None` if the file has to name one.
     pub default: Option<&'static str>,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Choice<'a> {
     }
 }
 
-/// Reads a variant; none if its name is unreadable.
+/// Reads a variant; `None` if its name is unreadable.
 pub(crate) fn read_kind<T: Kinds>(
     o: &mut node::Object<'_>,
     choice: &Choice<'_>,
@@ -108,9 +108,9 @@ pub(crate) fn kinds_schema<T: Kinds>(meaning: &str, generator: &mut SchemaGenera
     json_schema!({"description": meaning.trim(), "oneOf": variants})
 }
 
-/// Declares a type whose variants have parameters each: fields, declared as in `parameters!`,
-/// or a type of parameters. A row ends with the variant's name in files. `then` changes the
-/// schema for what else stands for a variant.
+/// Declares a type whose variants each have parameters: fields, declared as in `parameters!`, or a
+/// type of parameters. A row ends with the variant's name in files. The function after `then` adds
+/// other notations of variants to the schema.
 macro_rules! kinds {
     (
         $(#[doc = $doc:literal])*
@@ -204,7 +204,7 @@ macro_rules! kinds {
                 stringify!($name).into()
             }
 
-            #[allow(unused_mut, reason = "some have nothing else that stands for a variant")]
+            #[allow(unused_mut, reason = "only a type with `then` changes the schema")]
             fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
                 let mut schema =
                     $crate::parameters::kinds_schema::<Self>(concat!($($doc),*), generator);
@@ -215,7 +215,7 @@ macro_rules! kinds {
     };
 }
 
-/// The table of a variant: its type's, or that of its fields.
+/// The table of a variant: that of its type of parameters, or that of its fields.
 macro_rules! kind_table {
     ([type $inner:ty] [$($ignored:expr)?] [$checked:expr]) => {
         <$inner as $crate::Parameters>::TABLE
@@ -229,7 +229,7 @@ macro_rules! kind_table {
     };
 }
 
-/// A name in a pattern, in the place of a type.
+/// Replaces a type by a name, for patterns.
 macro_rules! bind {
     ($name:ident $type:ty) => {
         $name

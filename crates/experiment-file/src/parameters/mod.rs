@@ -1,9 +1,9 @@
-//! One declaration per parameter: its key, the values that it may have, its default and
-//! its meaning stand in one [`Parameter`]. The reader, the refusals, the canonical form,
-//! the JSON Schema and the tables of the documentation follow from tables of them.
+//! Declares each parameter once, as a [`Parameter`] with its key, its allowed values, its default
+//! and its meaning. The reader, the refusals, the canonical form, the JSON Schema and the tables of
+//! the documentation follow from these declarations.
 //!
-//! A kind with its own type declares it with `parameters!`, a field per parameter. The
-//! parameters of an algorithm are a plain table, as this crate knows no algorithm.
+//! A kind with its own type declares that type with `parameters!`, one field per parameter. The
+//! parameters of an algorithm are a plain table, because this crate knows no algorithm.
 
 mod kinds;
 mod read;
@@ -28,28 +28,28 @@ pub use value::{ParameterValue, Params};
 pub struct Parameter {
     /// Its key in the file.
     pub key: &'static str,
-    /// The values that it may have.
+    /// The allowed values.
     pub domain: Domain,
-    /// Its value where the file has none.
+    /// Its value if the file has none.
     pub default: DefaultValue,
-    /// What it is. The first sentence takes the default at its end.
+    /// Its description. [`description`](Self::description) adds the default to the first sentence.
     pub meaning: &'static str,
-    /// Its unit, where a program needs it, too; else the meaning has it.
+    /// Its unit, if programs need it; otherwise `meaning` has the unit.
     pub unit: &'static str,
-    /// Its value where a file with the semantics of the original has none, if it differs.
+    /// Its default under the semantics of SpikeSwarmSim, if that differs.
     pub(crate) original: Option<Original>,
-    /// How people read the default, where that is not the value alone.
+    /// The default for people, if that is more than the value.
     default_text: &'static str,
-    /// Another key that says the same.
+    /// Another key for the same quantity.
     also: Option<Also>,
-    /// The key of a parameter before this one, which has no value where this one has one.
+    /// The key of an earlier parameter that this one replaces: at most one of the two has a value.
     instead_of: Option<&'static str>,
-    /// Whether it may be null, too, which stands for none.
+    /// Whether null is allowed, which stands for no value.
     is_nullable: bool,
-    /// Whether the canonical form leaves it out where it has its default: the format has
-    /// not always had it, and older files keep their digests.
+    /// Whether the canonical form omits the default. This holds for parameters that are newer than
+    /// the format, so that older files keep their digests.
     is_recent: bool,
-    /// Whether 0 stands for no key in the canonical form.
+    /// Whether the canonical form omits the key if the value is 0.
     is_absent_at_zero: bool,
 }
 
@@ -81,22 +81,22 @@ pub enum Domain {
     Text,
     /// True or false.
     Switch,
-    /// A list of so many numbers, at least and at most.
+    /// A list of numbers, with its smallest and its largest length.
     Numbers(usize, usize),
-    /// A list of up to so many lists of numbers; each is as long as other parts of the file
-    /// make it.
+    /// A list of at most this many lists of numbers. Other parts of the file determine the length
+    /// of each.
     Vectors(usize),
-    /// The one whole number that other parts of the file leave.
+    /// The only whole number that other parts of the file allow.
     Certain,
     /// A name, or a list of them.
     Names,
     /// An object of parameters.
     Object(&'static Nested),
-    /// Such an object, or a list of up to so many.
+    /// Such an object, or a list of at most this many.
     Objects(&'static Nested, usize),
 }
 
-/// The value of a parameter where the file has none.
+/// The value of a parameter if the file has none.
 #[derive(Debug, Clone, Copy)]
 pub enum DefaultValue {
     /// This number.
@@ -105,22 +105,22 @@ pub enum DefaultValue {
     Whole(u32),
     /// This name.
     Name(&'static str),
-    /// This truth.
+    /// True or false.
     Switch(bool),
     /// These numbers.
     Numbers(&'static [f64]),
-    /// None: null, of a parameter that may be, or no key.
+    /// No value: null if the parameter allows it, otherwise no key.
     Null,
-    /// The algorithm computes it by this formula, for instance from the number of
-    /// genes d. The canonical form leaves the key out.
+    /// The algorithm computes the value by this formula, for instance from the number of genes d.
+    /// The canonical form omits the key.
     Formula(&'static str),
-    /// It depends on other parts of the file, in these words.
+    /// The value depends on other parts of the file, as this text describes.
     Depends(&'static str),
     /// The object without any key.
     Empty,
-    /// It is the one that the rest of the file leaves.
+    /// The only value that other parts of the file allow.
     Certain,
-    /// There is none: a file must have the key.
+    /// No default: a file must have the key.
     Required,
 }
 
@@ -129,21 +129,20 @@ pub enum DefaultValue {
 pub(crate) enum Original {
     /// This value.
     Value(DefaultValue),
-    /// A number that follows from the parameters before.
+    /// A number that follows from earlier parameters.
     From(fn(&Params) -> f64),
 }
 
-/// A key that says the same as another one, in a way of its own.
+/// A second key for the quantity of a parameter, with another scale.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Also {
     /// Its key.
     pub key: &'static str,
-    /// Largest number that it may have; the least one is 0 or, of a positive parameter, just
-    /// above.
+    /// Its largest number. The smallest is 0 or, if the parameter is positive, just above 0.
     pub max: f64,
-    /// What it is.
+    /// Its description.
     pub meaning: &'static str,
-    /// The parameter's value.
+    /// Converts its number to the value of the parameter.
     pub value: fn(f64) -> f64,
 }
 
@@ -202,8 +201,8 @@ constructors! {
     /// A whole number below `population_size`.
     pub below_population_size(default: u32) =
         Domain::BelowPopulationSize, DefaultValue::Whole(default);
-    /// One of `names`, the first of which is the default; `unsupported` are names
-    /// of SpikeSwarmSim that are refused as such.
+    /// One of `names`, the first of which is the default. `unsupported`: names of SpikeSwarmSim
+    /// that are refused as not supported.
     pub one_of(names: &'static [&'static str], unsupported: &'static [&'static str]) =
         Domain::OneOf { names, unsupported }, DefaultValue::Name(names[0]);
     /// A name, for instance of a colour.
@@ -232,29 +231,29 @@ macro_rules! setters {
 setters! {
     /// The same with a unit.
     measured(unit: &'static str) = unit: unit;
-    /// The same with another default where the semantics are SpikeSwarmSim's.
+    /// The same with another default under the semantics of SpikeSwarmSim.
     original(default: DefaultValue) = original: Some(Original::Value(default));
-    /// The same with a default that follows from the parameters before, where the semantics are
-    /// SpikeSwarmSim's.
+    /// The same with a default under the semantics of SpikeSwarmSim that follows from earlier
+    /// parameters.
     original_from(default: fn(&Params) -> f64) = original: Some(Original::From(default));
-    /// The same with these words for the default.
+    /// The same with this text for the default.
     shown(text: &'static str) = default_text: text;
-    /// The same with another key that says it, too.
+    /// The same with a second key for its quantity.
     also(also: Also) = also: Some(also);
-    /// The same, taking the place of another parameter.
+    /// The same as a replacement of an earlier parameter.
     instead_of(key: &'static str) = instead_of: Some(key);
-    /// The same or null.
+    /// The same, with null allowed.
     or_null() = is_nullable: true;
-    /// The same or null, which is the default.
+    /// The same, with null allowed, which is then the default.
     null() = is_nullable: true, default: DefaultValue::Null;
-    /// The same, left out of the canonical form where it has its default.
+    /// The same, omitted from the canonical form if it has its default.
     recent() = is_recent: true;
-    /// The same, left out of the canonical form where it is 0.
+    /// The same, omitted from the canonical form if it is 0.
     unless_zero() = is_absent_at_zero: true;
 }
 
 impl Parameter {
-    /// Whether the canonical form leaves the key out for this value.
+    /// Whether the canonical form omits the key for this value.
     pub(crate) fn is_left_out(&self, value: &ParameterValue) -> bool {
         let is_default = || self.default.value().as_ref() == Some(value);
         let is_none = match value {
@@ -302,8 +301,8 @@ impl Domain {
     /// A number of either sign.
     pub const QUANTITY: Self = Self::Between(-limits::MAGNITUDE, limits::MAGNITUDE);
 
-    /// Whether `value` lies in the domain, which is one that algorithms have, in a population of
-    /// this size.
+    /// Whether `value` lies in the domain, in a population of this size. Only for domains of
+    /// parameters of algorithms.
     pub fn contains(&self, value: &ParameterValue, population_size: u32) -> bool {
         match (*self, value) {
             (Self::Positive, &ParameterValue::Number(x)) => {
@@ -321,7 +320,7 @@ impl Domain {
 }
 
 impl fmt::Display for Domain {
-    /// As in "must be ...", of the domains that algorithms have.
+    /// Completes "must be ...". Only for domains of parameters of algorithms.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Positive => write!(f, "positive and at most {}", limits::MAGNITUDE),
@@ -335,7 +334,7 @@ impl fmt::Display for Domain {
 }
 
 impl DefaultValue {
-    /// The value; none if something else decides it.
+    /// The value; `None` if something else determines it.
     pub fn value(self) -> Option<ParameterValue> {
         match self {
             Self::Number(number) => Some(ParameterValue::Number(number)),

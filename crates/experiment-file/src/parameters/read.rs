@@ -7,10 +7,10 @@ use crate::limits;
 use crate::node::{Node, Object};
 use crate::semantics::Semantics;
 
-/// What a parameter has where the file is silent and its table leaves the value open.
+/// Defaults, by key, of parameters whose default depends on other parts of the file.
 pub(crate) type Given<'a> = [(&'a str, ParameterValue)];
 
-/// Where the keys of parameters may stand.
+/// A place in a file that may have the keys of parameters.
 pub(crate) trait Keys<'a> {
     /// The value of a key, if the file has it.
     fn optional(&mut self, key: &'static str) -> Option<Node<'a>>;
@@ -36,7 +36,7 @@ impl<'a> Keys<'a> for Object<'a> {
     }
 }
 
-/// The parameters of a type. `given` are defaults that depend on other parts of the file.
+/// Reads the parameters of a type. `given`: defaults that depend on other parts of the file.
 pub(crate) fn read<T: Parameters>(
     o: &mut Object<'_>,
     semantics: Semantics,
@@ -45,7 +45,7 @@ pub(crate) fn read<T: Parameters>(
     T::from_params(&table(o, &T::TABLE, semantics, given))
 }
 
-/// The parameters of a table, and the keys that it accepts beside them.
+/// Reads the parameters of a table, and the keys that it accepts beside them.
 pub(super) fn table(
     o: &mut Object<'_>,
     table: &Table,
@@ -71,7 +71,7 @@ pub(crate) fn optional<T: Parameters>(
     o.optional(key).map(|node| node.object(|o| read(o, semantics, given)))
 }
 
-/// An object of parameters; a missing one is read as an empty one.
+/// An object of parameters. A missing object counts as an empty one.
 pub(crate) fn inner<T: Parameters>(
     o: &mut Object<'_>,
     key: &'static str,
@@ -81,7 +81,7 @@ pub(crate) fn inner<T: Parameters>(
     o.inner(key, |o| read(o, semantics, given))
 }
 
-/// The parameters of a list of them, wherever their keys stand.
+/// Reads parameters from any place that may have their keys.
 pub(crate) fn params<'a>(
     keys: &mut impl Keys<'a>,
     parameters: &[Parameter],
@@ -96,7 +96,7 @@ pub(crate) fn params<'a>(
             stated.push(parameter.key);
             match parameter.instead_of {
                 Some(other) if stated.contains(&other) => {
-                    keys.problem(parameter.key, format!("`{other}` says the same"));
+                    keys.problem(parameter.key, format!("`{other}` states the same quantity"));
                 }
                 Some(other) => params.set(other, ParameterValue::Null),
                 None => {}
@@ -126,7 +126,7 @@ pub(super) fn absent<T: Parameters>(semantics: Semantics) -> Params {
 }
 
 impl Parameter {
-    /// What the file says, under either key.
+    /// The value in the file, under either key.
     fn find<'a>(
         &self,
         keys: &mut impl Keys<'a>,
@@ -144,7 +144,7 @@ impl Parameter {
             return found.and_then(value);
         };
         if found.is_some() {
-            node.problem(format!("`{}` says the same", self.key));
+            node.problem(format!("`{}` states the same quantity", self.key));
         }
         let number = match self.domain {
             Domain::Positive => node.positive(),
@@ -156,7 +156,7 @@ impl Parameter {
         }
     }
 
-    /// What the file means where it says nothing.
+    /// The value if the file has neither key.
     fn absent(
         &self,
         params: &Params,
@@ -178,7 +178,7 @@ impl Parameter {
         }
     }
 
-    /// The value at a place of the file; none if it stands for the default.
+    /// The value at a place in the file; `None` if it stands for the default.
     fn value(
         &self,
         node: Node<'_>,
@@ -194,7 +194,7 @@ impl Parameter {
             Domain::Between(min, max) => node.number(min..=max).into(),
             Domain::Seed => ParameterValue::Long(node.seed()),
             Domain::Whole(min, max) => node.u32(min..=max).into(),
-            // How large it may be is a relation between two keys.
+            // Its bound depends on another key, so `check` compares the two.
             Domain::BelowPopulationSize => node.u32(0..=limits::POPULATION).into(),
             Domain::WholeOrAll(_) if node.is_string() => {
                 node.one_of(&["all"], &[]);

@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use super::{DefaultValue, Domain, Parameter, ParameterValue, Table};
 use crate::{limits, schema};
 
-/// Of an object with the parameters of a table.
+/// The schema of an object with the parameters of a table.
 pub(crate) fn object(table: &Table, meaning: &str, generator: &mut SchemaGenerator) -> Schema {
     let mut properties = properties(table.parameters, generator);
     for parameter in table.checked {
@@ -49,7 +49,7 @@ pub(crate) fn add_part(
     }
 }
 
-/// Of each key of a table.
+/// The schema of each key of a table.
 pub(crate) fn properties(
     table: &[Parameter],
     generator: &mut SchemaGenerator,
@@ -98,7 +98,7 @@ impl Parameter {
             Domain::Text => json!({"type": "string"}),
             Domain::Switch => json!({"type": "boolean"}),
             Domain::Numbers(min, max) => list(quantity(), min, max),
-            // How long they are depends.
+            // The lengths depend on other parts of the file.
             Domain::Vectors(max) => list(list(quantity(), 1, 2), 1, max),
             Domain::Certain => whole(0, u32::MAX),
             Domain::Names => schema::names(generator).to_value(),
@@ -117,13 +117,13 @@ impl Parameter {
     }
 }
 
-/// The lower bound of what stands for the same as a parameter.
+/// The lower bound of a second key for the quantity of a parameter.
 fn least(domain: Domain) -> f64 {
     if matches!(domain, Domain::Positive) { limits::MAGNITUDE.recip() } else { 0.0 }
 }
 
 fn number(min: f64, max: f64) -> Value {
-    // People think of "above 0".
+    // People read this bound as "above 0".
     if min == limits::MAGNITUDE.recip() {
         json!({"type": "number", "exclusiveMinimum": 0, "maximum": max})
     } else {

@@ -7,20 +7,20 @@ use super::{Parameter, ParameterValue, Params};
 use crate::node::Node;
 use crate::semantics::Semantics;
 
-/// What an object of parameters may have.
+/// The keys that an object of parameters may have.
 #[derive(Debug, Clone, Copy)]
 pub struct Table {
     /// The parameters, in the order of the canonical form.
     pub parameters: &'static [Parameter],
     /// Keys without effect, and why they have none.
     pub(crate) ignored: &'static [(&'static [&'static str], &'static str)],
-    /// Keys that only repeat what is certain; their values are checked.
+    /// Keys without effect whose values are checked.
     pub(crate) checked: &'static [Parameter],
 }
 
-/// A type whose fields are parameters: its table, and the way between the two.
+/// A type whose fields are parameters: its table, and the conversions from and to parameters.
 pub trait Parameters: Sized + JsonSchema + 'static {
-    /// What an object of them may have.
+    /// The keys that an object of these parameters may have.
     const TABLE: Table;
 
     /// Such an object as the value of a parameter.
@@ -32,10 +32,10 @@ pub trait Parameters: Sized + JsonSchema + 'static {
         schema: |generator| generator.subschema_for::<Self>(),
     };
 
-    /// The value with these parameters, all of which are there.
+    /// The value with these parameters. `params` has all of them.
     fn from_params(params: &Params) -> Self;
 
-    /// Its parameters as far as the canonical form has them.
+    /// Its parameters in the canonical form.
     fn to_params(&self) -> Params;
 }
 
@@ -61,16 +61,17 @@ impl Table {
     ///
     /// # Panics
     ///
-    /// If there is none: tables and types are declared together.
+    /// If the table lacks the key, which cannot happen, because tables and types are declared
+    /// together.
     pub(crate) fn find(&self, key: &str) -> &'static Parameter {
         self.parameters.iter().find(|parameter| parameter.key == key).expect("a field's key")
     }
 }
 
-/// Declares types whose fields are parameters. A row is the field, its key in the file if
-/// that is another word, its type, and the constructor of its [`Parameter`] without key and
-/// meaning. `: Default` makes the defaults those of the type. `parts` are fields that the reader
-/// fills in itself, each with its schema; it begins with their `Default`.
+/// Declares types whose fields are parameters. A row has the field, its key in the file if that
+/// differs, its type, and the constructor of its [`Parameter`] without key and meaning. With `:
+/// Default`, the type implements `Default` by the defaults of its parameters. `parts` are fields
+/// that the reader fills in itself, beginning with their `Default`; each has its schema.
 macro_rules! parameters {
     ($(
         $(#[doc = $doc:literal])*
@@ -208,8 +209,8 @@ macro_rules! key {
     };
 }
 
-/// Makes variants of a type, whose names `serde` knows, values of parameters. `unsupported` are
-/// names of SpikeSwarmSim that are refused as such.
+/// Makes the variants of a type, whose names `serde` knows, values of parameters. `unsupported`:
+/// names of SpikeSwarmSim that are refused as not supported.
 macro_rules! variants {
     ($($name:ident, unsupported: $unsupported:expr;)*) => {$(
         impl $name {

@@ -7,8 +7,7 @@ use serde::{Serialize, Serializer};
 use super::{Parameter, Parameters};
 use crate::NamedMap;
 
-/// Parameters by key, for instance those of an algorithm. Those that are absent have their
-/// defaults.
+/// Parameters by key, for instance those of an algorithm. Absent parameters have their defaults.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Params(NamedMap<ParameterValue>);
@@ -35,10 +34,10 @@ pub enum ParameterValue {
     Names(Vec<String>),
     /// An object.
     Object(Params),
-    /// Several objects; one alone is written without a list around it.
+    /// Several objects. A single object is written without a list around it.
     #[serde(serialize_with = "one_or_list")]
     Objects(Vec<Params>),
-    /// None.
+    /// No value.
     Null,
 }
 
@@ -55,7 +54,7 @@ impl Params {
         self
     }
 
-    /// The same parameters with one that goes into the canonical form if that needs it.
+    /// The same parameters with another one, unless the canonical form omits it.
     #[must_use]
     pub(crate) fn with_canonical(
         self,
@@ -71,18 +70,18 @@ impl Params {
         self.0.iter().map(|(key, value)| (key.as_str(), value))
     }
 
-    /// The value of `parameter`, or its default; none if it has neither because
-    /// the algorithm computes its default.
+    /// The value of `parameter`, or its default; `None` if the algorithm computes the default.
     pub fn get(&self, parameter: &Parameter) -> Option<ParameterValue> {
         self.0.get(parameter.key).cloned().or_else(|| parameter.default.value())
     }
 
-    /// The value of `parameter`, or its default, as a type that it has; an option is none if
-    /// the algorithm computes the default.
+    /// The value of `parameter`, or its default, as a `T`. If the algorithm computes the default,
+    /// an option is `None`.
     ///
     /// # Panics
     ///
-    /// If the value is of another type: parameters are checked before they are used.
+    /// If the value has another type, which cannot happen, because parameters are checked before
+    /// they are used.
     pub fn of<T: TryFrom<ParameterValue, Error = ParameterValue>>(
         &self,
         parameter: &Parameter,
@@ -90,7 +89,7 @@ impl Params {
         typed(parameter.key, self.get(parameter))
     }
 
-    /// The same of a key that is there.
+    /// The value of a key that is present, as a `T`.
     pub(crate) fn of_key<T: TryFrom<ParameterValue, Error = ParameterValue>>(
         &self,
         key: &str,
@@ -131,7 +130,7 @@ impl From<&str> for ParameterValue {
     }
 }
 
-/// Both ways between the values and the types that fields have.
+/// Conversions between values of parameters and the types of fields.
 macro_rules! types {
     ($($type:ty = $variant:ident,)*) => {$(
         impl From<$type> for ParameterValue {

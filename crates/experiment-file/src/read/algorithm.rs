@@ -6,8 +6,8 @@ use super::population::{ParamsReader, population};
 use crate::semantics::Semantics;
 use crate::{AlgorithmConfig, FitnessFunction, parameters};
 
-/// `has_task`: whether the file has a task of its own, which computes the fitness unless a
-/// function is named.
+/// `has_task`: whether the file has a task of its own, which computes the fitness unless the file
+/// names a function.
 pub(super) fn algorithm(
     o: &mut Object<'_>,
     algorithms: Algorithms,

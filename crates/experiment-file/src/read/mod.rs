@@ -56,7 +56,7 @@ fn experiment(o: &mut Object<'_>, default_name: &str, algorithms: Algorithms) ->
             if let Err(message) = check_name(default_name) {
                 o.problem(
                     "name",
-                    format!("`name` is missing, and the default does not serve: {message}"),
+                    format!("`name` is missing, and the default name is invalid: {message}"),
                 );
             }
             default_name.to_owned()

@@ -13,7 +13,7 @@ pub(crate) fn parse(text: &str) -> Result<Value<'_>, ConfigError> {
         let message = format!("the file has {} bytes, the limit is {limit}", text.len());
         return Err(syntax_error(None, message));
     }
-    // The parser recurses, and its only own bound is half a megabyte of stack.
+    // The parser recurses, and limits only its stack, to half a megabyte, not its depth.
     let depth = nesting(text);
     if depth > limits::NESTING {
         let limit = limits::NESTING;

@@ -15,8 +15,7 @@ pub(super) enum ParamsReader {
     Of(&'static AlgorithmDescription),
     /// They are kept unchanged, because they were checked before.
     Unchecked,
-    /// They are skipped, because the algorithm's name is unreadable, which determines the
-    /// parameters.
+    /// They are skipped, because they depend on the algorithm, whose name is unreadable.
     Skip,
 }
 
@@ -93,7 +92,7 @@ impl<'a> Keys<'a> for Places<'_, 'a> {
         let inner = self.inner.as_mut().and_then(|inner| inner.optional(key));
         let outer = self.outer.optional(key);
         if let (Some(_), Some(outer)) = (&inner, &outer) {
-            outer.problem("`params` has this key, too");
+            outer.problem("`params` has the same key");
         }
         inner.or(outer)
     }

@@ -5,7 +5,7 @@ use super::world::{orientations, positions};
 use crate::semantics::Semantics;
 use crate::{RobotConfig, RobotController, RobotInitializers, limits, parameters, sensors};
 
-/// Reads a robot. `center`: of the world.
+/// Reads a robot. `center`: the centre of the world.
 pub(super) fn robot(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> RobotConfig {
     const UNSUPPORTED: [&str; 1] = ["cascade_controller"];
     let num_instances = o.required("num_instances").u32(1..=limits::ROBOTS);

@@ -10,8 +10,8 @@ pub(super) fn task(o: &mut Object<'_>) -> TaskConfig {
 fn script(node: Node<'_>) -> ScriptConfig {
     if node.is_string() {
         node.problem(
-            "is the path of a file that has not been read; `swarmctl` reads it if it gets the \
-             experiment file; expected an object of `name` and `text`",
+            "is a path, which only `swarmctl` reads, when it gets the experiment file; \
+             expected an object of `name` and `text`",
         );
         return ScriptConfig { name: String::new(), text: String::new() };
     }

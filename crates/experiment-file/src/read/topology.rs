@@ -21,16 +21,16 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
             ("initial_rates", InitialRates::default().into()),
             ("motor_tau", ParameterValue::Null),
         ] {
-            o.optional(key)
-                .iter()
-                .for_each(|node| node.problem("a key of rate neurons; these spike"));
+            o.optional(key).iter().for_each(|node| {
+                node.problem("only rate neurons have this key; these neurons spike")
+            });
             given.push((key, value));
         }
     }
     let topology: TopologyConfig = parameters::read(o, semantics, &given);
     let synapse_model = topology.synapse_model;
     if synapse_model == SynapseModel::Dynamic && model.is_some() && !is_spiking {
-        o.problem("synapse_model", "dynamic synapses need neurons that spike");
+        o.problem("synapse_model", "dynamic synapses need spiking neurons");
     }
     let stimuli = o.required("stimuli").map(1, |_, node| node.object(plain));
     let encoding = encoding::encodings(o, &stimuli, topology.time_scale);
@@ -64,7 +64,7 @@ fn neuron_model(o: &mut Object<'_>) -> Option<NeuronModel> {
     if let (Some(Some(outer)), Some(Some(inner))) = (outer, inner)
         && outer != inner
     {
-        o.problem("neuron_model", "`neurons` has another one");
+        o.problem("neuron_model", "`neurons` names another model");
     }
     outer.or(inner).unwrap_or(Some(NeuronModel::default()))
 }
@@ -98,7 +98,7 @@ fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
     if let (Some(outer), Some(inner)) = (outer, inner)
         && outer != inner
     {
-        o.problem("activation", "`params` has another one");
+        o.problem("activation", "`params` has another activation");
     }
     EnsembleConfig { activation: outer.or(inner).or(spec.activation), params, ..ensemble }
 }
@@ -130,7 +130,7 @@ fn synapse_group(o: &mut Object<'_>, model: SynapseModel) -> SynapseGroupConfig 
         }
         SynapseModel::Dynamic => {
             if !o.or("ntx_fixed", true, Node::bool) {
-                o.problem("ntx_fixed", "not supported: transmitters are those of the file");
+                o.problem("ntx_fixed", "not supported: the file determines the transmitters");
             }
             Some(o.or("neuroTX", Neurotransmitter::default(), |node| {
                 node.variant(&[]).unwrap_or_default()

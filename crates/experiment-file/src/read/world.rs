@@ -20,7 +20,7 @@ pub(super) fn world(o: &mut Object<'_>, semantics: Semantics) -> WorldConfig {
 fn object(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> ObjectConfig {
     const KNOWN: [&str; 5] = ["robot", "light_source", "ground_area", "food_area", "nest"];
     for key in ["positions", "orientations"] {
-        o.ignored(key, "`initializers` say where objects start");
+        o.ignored(key, "`initializers` determine where objects start");
     }
     match o.required("type").one_of(&KNOWN, &[]) {
         Some("robot") => ObjectConfig::Robot(robot(o, center, semantics)),
@@ -86,7 +86,8 @@ fn position_initializers(o: &mut Object<'_>, center: [f64; 2]) -> PositionInitia
     })
 }
 
-/// Reads start positions. `center`: of the world, the default centre of arrangements.
+/// Reads start positions. `center`: the centre of the world, which is the default centre of
+/// arrangements.
 pub(super) fn positions(node: Node<'_>, center: [f64; 2]) -> Initializer {
     let choice = Choice::any::<Initializer>(&["grid_graph"]);
     let centers = [("center", center.into()), ("initial_pos", center.into())];

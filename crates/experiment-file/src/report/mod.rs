@@ -36,8 +36,8 @@ impl fmt::Display for Excerpt<'_> {
     }
 }
 
-/// The text of a problem; or, for costly texts, a function that makes it, called only if there is
-/// room.
+/// The text of a problem, or a function that makes it. A function is called only if there is room,
+/// which saves costly texts.
 pub(crate) trait Message {
     fn text(self) -> String;
 }
@@ -73,7 +73,7 @@ struct Remarks {
     warnings: Vec<Located>,
     /// Problems beyond [`limits::PROBLEMS`].
     n_omitted: usize,
-    /// Places whose value is a placeholder for an unreadable one.
+    /// Places whose value is a placeholder for an unreadable value.
     broken: Vec<Path>,
 }
 

@@ -1,4 +1,4 @@
-//! Names: the allowed ones, and suggestions for unknown ones.
+//! Checks names, and suggests known names for unknown ones.
 
 use super::Excerpt;
 use crate::limits;
@@ -9,7 +9,7 @@ pub(crate) fn check_name(name: &str) -> Result<(), String> {
     if n == 0 {
         Err("a name must not be empty".to_owned())
     } else if n > limit {
-        Err(format!("a name must have at most {limit} characters, this has {n}"))
+        Err(format!("a name must have at most {limit} characters, not {n}"))
     } else if name.chars().any(char::is_control) {
         Err("a name must not contain control characters".to_owned())
     } else {
@@ -29,7 +29,7 @@ pub(crate) fn unknown_name(name: &str, expected: &[&str], unsupported: &[&str]) 
 
 /// The nearest known name, or all of them if none is near.
 pub fn suggestion<S: AsRef<str>>(name: &str, known: &[S]) -> String {
-    // A longer name resembles no known one, and the comparison takes quadratic time.
+    // A longer name resembles no known name, and a comparison would take quadratic time.
     let comparable = name.len() <= limits::NAME_CHARS;
     let name = name.to_lowercase();
     let similarity = |known: &S| strsim::jaro_winkler(&name, &known.as_ref().to_lowercase());
@@ -49,7 +49,7 @@ fn known_names<S: AsRef<str>>(known: &[S]) -> String {
     let quoted: Vec<String> = quoted.collect();
     let rest = if known.len() > SHOWN { ", ..." } else { "" };
     if quoted.is_empty() {
-        "none is known here".to_owned()
+        "none is allowed here".to_owned()
     } else {
         format!("known: {}{rest}", quoted.join(", "))
     }

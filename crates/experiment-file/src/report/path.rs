@@ -5,7 +5,7 @@ use std::{fmt, iter};
 
 use super::Excerpt;
 
-/// A place in the file, from the root. Cheap to extend, because every value has one.
+/// A place in the file, from the root. It is cheap to extend, because every value has a place.
 #[derive(Clone, Default)]
 pub(crate) struct Path(Option<Rc<Step>>);
 
@@ -35,7 +35,7 @@ impl Path {
         self.join(Segment::Index(index))
     }
 
-    /// The set of keys of the map at this place, for checks that rely on the keys and not on the
+    /// The set of keys of the map at this place, for checks that rely on the keys but not on the
     /// values.
     pub(crate) fn keys(&self) -> Self {
         self.join(Segment::Keys)
@@ -45,7 +45,7 @@ impl Path {
         Self(Some(Rc::new(Step { parent: self.clone(), segment })))
     }
 
-    /// From the root.
+    /// The segments, from the root.
     pub(super) fn segments(&self) -> Vec<&Segment> {
         let steps = iter::successors(self.0.as_deref(), |step| step.parent.0.as_deref());
         let mut segments: Vec<_> = steps.map(|step| &step.segment).collect();
@@ -53,7 +53,7 @@ impl Path {
         segments
     }
 
-    /// Whether one of the two contains the other.
+    /// Whether one of the two places contains the other.
     pub(super) fn overlaps(&self, other: &Self) -> bool {
         self.segments().into_iter().zip(other.segments()).all(|(a, b)| a == b)
     }

@@ -36,7 +36,7 @@ fn generated_files_are_accepted_and_their_canonical_forms_mean_the_same() {
 }
 
 #[test]
-fn damaged_files_are_read_or_refused_and_what_is_read_makes_sense() {
+fn damaged_files_are_refused_or_read_to_a_valid_experiment() {
     let n_accepted: u64 = thread::scope(|scope| {
         let halves = [0, 1].map(|half| {
             scope.spawn(move || (half..n_files()).step_by(2).map(n_accepted_variants).sum::<u64>())
@@ -60,7 +60,7 @@ fn n_accepted_variants(index: u64) -> u64 {
             Ok((config, _)) => {
                 n_accepted += 1;
                 if variant == 0 {
-                    // A population may be so small that there is a warning.
+                    // A small population may give a warning.
                     let again = read(&config.to_canonical_json()).map(|(config, _)| config);
                     assert_eq!(again.unwrap(), config);
                 }
@@ -90,7 +90,7 @@ fn accepted_files_can_be_simulated() {
     assert!(n_simulated > n * 9 / 10, "{n_simulated} of {n}");
 }
 
-/// For all parameters and genes within their ranges, and with plasticity.
+/// This holds for all parameters and genes within their ranges, and with plasticity.
 #[test]
 fn no_accepted_network_of_spiking_neurons_ends_up_in_nan() {
     let (mut n_simulated, mut n_learning, mut n_encoded, mut n_voltages) = (0, 0, 0, 0);

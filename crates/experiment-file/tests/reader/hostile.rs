@@ -39,7 +39,7 @@ fn comments_and_trailing_commas_change_nothing() {
 }
 
 #[test]
-fn what_is_not_strict_json_is_refused_with_its_line() {
+fn text_that_is_not_strict_json_is_refused_with_its_line() {
     for (text, expected) in [
         ("", "line 1: the file is empty"),
         ("\u{feff}", "line 1: the file is empty"),
@@ -105,7 +105,7 @@ proptest! {
         let _ = read(&text);
     }
 
-    /// Typing errors: pieces cut out, doubled, overwritten.
+    /// Typing errors: pieces are cut out, doubled or overwritten.
     #[test]
     fn any_damaged_file_is_read_or_refused(
         cuts in prop::collection::vec((0..BASE.len(), 0_usize..40, ".{0,6}"), 1..4)
@@ -123,7 +123,7 @@ proptest! {
         }
     }
 
-    /// Every value and key in turn becomes something else that is JSON.
+    /// Every value and key in turn becomes some other JSON.
     #[test]
     fn any_transplanted_file_is_read_or_refused(
         tokens in prop::collection::vec((any::<prop::sample::Index>(), 0..REPLACEMENTS.len()), 1..6)

@@ -53,7 +53,7 @@ fn the_semantics_of_the_original_are_other_defaults() {
 }
 
 #[test]
-fn what_a_file_states_it_has_under_any_semantics() {
+fn stated_values_hold_under_any_semantics() {
     let thesis = edited(r#""name": "base","#, r#""name": "base", "semantics": "thesis","#);
     assert_eq!(accept(&thesis), accept(BASE));
     let distance = r#""distance_sensor": {"n_sectors": 4, "range": 60, "decay_rho": 0.05,
@@ -112,7 +112,7 @@ fn constants_of_the_original_are_translated() {
 }
 
 #[test]
-fn what_steers_the_original_alone_is_ignored_with_a_warning_each() {
+fn keys_that_concern_only_the_original_are_ignored_with_a_warning_each() {
     let name = r#""name": "base","#;
     let text = edited(name, r#""name": "base", "num_processes": 8, "render": true,"#)
         .replace(r#""name": "GA""#, r#""name": "SNES""#)

@@ -25,7 +25,7 @@ struct Probe {
     schema: Option<Value>,
 }
 
-/// The keys of all objects of a file, present and omitted.
+/// The keys of all objects of a file, both present and omitted ones.
 struct Walk<'a> {
     root: &'a Value,
     file: &'a Value,
@@ -152,8 +152,8 @@ fn the_reader_refuses_a_value_of_a_parameter_if_the_schema_does() {
     let (mut n_refused, mut n_accepted) = (0, 0);
     for file in files() {
         for probe in probes(&root, &file) {
-            // A population may contain the parameters of its algorithm directly, and no schema
-            // tells of which algorithm. An object with a position determines the number of
+            // A population may contain the parameters of its algorithm directly, but a schema
+            // cannot tell the algorithm. An object with a position determines the number of
             // components.
             let of_itself = probe.parameter.0 != "PopulationConfig"
                 && probe.parameter.1 != "size"

@@ -28,7 +28,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""neuron_model": "rate_model","#, r#""motor_tau": 0.04,"#,
      "line 9: topology.motor_tau: 0.04 s is below dt / 2: the network would be unstable"),
     (r#""controller": null"#, r#""controller": {"name": "light_rnd_pos_controller", "params": {"speed": 1, "step": 0.1}}"#,
-     "line 63: world.objects.lamp.controller.params.step: `speed` says the same"),
+     "line 63: world.objects.lamp.controller.params.step: `speed` states the same quantity"),
     // Shape.
     (r#""name": "base","#, r#""name": "base", "name": "other","#,
      "line 2: name: duplicate key"),
@@ -84,7 +84,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""activation": "tanh""#, r#""activation": "relu""#,
      "line 15: topology.ensembles.OUT_WHEELS.activation: unknown name `relu`; known: `sigmoid`, `tanh`"),
     (r#""activation": "tanh""#, r#""activation": "tanh", "params": {"activation": "sigmoid"}"#,
-     "line 15: topology.ensembles.OUT_WHEELS.activation: `params` has another one"),
+     "line 15: topology.ensembles.OUT_WHEELS.activation: `params` has another activation"),
     (r#""pre": ["MSG", "LIGHT"]"#, r#""pre": ["MSG", "LIHGT"]"#,
      "line 24: topology.synapses.in.pre[1]: no ensemble or stimulus is named `LIHGT`; did you mean `LIGHT`?"),
     (r#""pre": ["MSG", "LIGHT"]"#, r#""pre": ["MSG", "MSG"]"#,
@@ -109,7 +109,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
       line 24: topology.synapses.in.pre[1]: no ensemble or stimulus is named `LIGHT`; known: `H`, `OUT_MSG`, `OUT_LED`, `OUT_MODE`, `OUT_WHEELS`, `MSG`, `H`"),
     // Features that only SpikeSwarmSim has.
     (r#""neuron_model": "rate_model""#, r#""neuron_model": "rate_model", "synapse_model": "dynamic_synapse""#,
-     "line 9: topology.synapse_model: dynamic synapses need neurons that spike"),
+     "line 9: topology.synapse_model: dynamic synapses need spiking neurons"),
     (r#"{"scheme": "IdentityEncoding"}"#, r#"{"scheme": "PoissonRateCoding"}"#,
      "line 8: topology.encoding.MSG.scheme: encodes into spikes, which `rate_model` neurons do not take; they take `IdentityEncoding`"),
     (r#"{"scheme": "IdentityEncoding"}"#, r#"{"scheme": "PoissonCoding"}"#,
@@ -209,7 +209,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""num_elite": 2"#, r#""num_elite": 20"#,
      "line 45: algorithm.populations.neurons: `num_elite` 20 leaves no room in a population of 20"),
     (r#""num_elite": 2"#, r#""num_elite": 2, "params": {"num_elite": 2}"#,
-     "line 46: algorithm.populations.neurons.num_elite: `params` has this key, too"),
+     "line 46: algorithm.populations.neurons.num_elite: `params` has the same key"),
     // Limits.
     (r#""population_size": 20"#, r#""population_size": 200000"#,
      "line 37: algorithm.population_size: must be between 1 and 100000, is 200000"),
@@ -237,12 +237,12 @@ fn a_query_with_two_meanings_is_ambiguous() {
 }
 
 #[test]
-fn a_file_without_a_name_needs_a_default_that_is_one() {
+fn a_file_without_a_name_needs_a_valid_default() {
     let text = edited(r#""name": "base","#, "");
     let error = ExperimentConfig::from_json(&text, "", ALGORITHMS).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "line 1: `name` is missing, and the default does not serve: a name must not be empty"
+        "line 1: `name` is missing, and the default name is invalid: a name must not be empty"
     );
 }
 
@@ -259,7 +259,7 @@ fn a_query_of_a_fixed_group_covers_nothing() {
 }
 
 #[test]
-fn a_fitness_needs_what_it_measures() {
+fn fitness_functions_need_the_objects_that_they_measure() {
     let task = r#""fitness_function": "goto_light""#;
     let light = r#""type": "light_source",
         "num_instances": 1,
@@ -332,7 +332,7 @@ fn costs_are_limited_in_sum() {
     }
 }
 
-/// The shipped leader selection with LIF neurons, one passage replaced.
+/// Replaces one passage of the shipped leader selection with LIF neurons.
 #[test]
 fn mistakes_of_spiking_networks_have_answers() {
     let (_, base) = super::shipped::spiking()
@@ -358,7 +358,7 @@ const SPIKING_MISTAKES: &[(&str, &str, &str)] = &[
       line 66: algorithm.populations.p1.max_vals[3]: delays are from 1 to 9 substeps, not -45\n\
       line 67: algorithm.populations.p1.min_vals[3]: delays are from 1 to 9 substeps, not -65"),
     (r#""dt": 1,"#, r#""dt": 1, "motor_tau": 0.5,"#,
-     "line 5: topology.motor_tau: a key of rate neurons; these spike"),
+     "line 5: topology.motor_tau: only rate neurons have this key; these neurons spike"),
     (r#""H1": {"n": 10}"#, r#""H1": {"n": 10, "activation": "tanh"}"#,
      "line 21: topology.ensembles.H1.activation: unknown key; known: `n`, `params`"),
     (r#""H1": {"n": 10}"#, r#""H1": {"n": 10, "params": {"time_refrac": 2.5}}"#,
@@ -370,7 +370,7 @@ const SPIKING_MISTAKES: &[(&str, &str, &str)] = &[
     (r#"{"scheme": "FirstToSpike"}"#, r#"{"scheme": "ThresholdDecoding"}"#,
      "line 52: topology.decoding.outC: decodes activities, which `lif` neurons do not have"),
     (r#"{"scheme": "FirstToSpike"}"#, r#"{"scheme": "RankOrderDecoding", "params": {"num_outputs": 2}}"#,
-     "line 52: topology.decoding.outC: the actuator needs 1 output, these are 2"),
+     "line 52: topology.decoding.outC: the actuator needs 1 output, not 2"),
     (r#""outA": {"scheme": "LinearPopulationDecoding", "params": {"num_outputs": 2}}"#,
      r#""outA": {"scheme": "LinearPopulationDecoding"}"#,
      "line 50: topology.decoding.outA: has 1 outputs, but messages of robot `robotA` have `msg_length` 2"),
@@ -431,7 +431,7 @@ fn encoded(entry: &str) -> String {
 }
 
 #[test]
-fn encoders_say_what_is_wrong_with_their_fields() {
+fn mistakes_of_encoders_have_answers() {
     for (entry, expected) in [
         (
             r#"{"scheme": "LIF_Encoding"}"#,
@@ -459,7 +459,7 @@ fn encoders_say_what_is_wrong_with_their_fields() {
         ),
         (
             r#"{"scheme": "PoissonRateCoding", "receptive_field": {"name": "identity_receptive_field", "params": {"n_neurons": 2}}}"#,
-            "encoding.I5.receptive_field.params.n_neurons: unknown key; none is known here",
+            "encoding.I5.receptive_field.params.n_neurons: unknown key; none is allowed here",
         ),
         (
             r#"{"scheme": "PoissonRateCoding", "receptive_field": {"name": "cubic"}}"#,

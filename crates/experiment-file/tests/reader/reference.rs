@@ -1,6 +1,5 @@
-//! Files of SpikeSwarmSim, accepted unchanged. They are not part of the project: if they
-//! are absent, these tests say so and pass. Files of our own with all their keys are tested
-//! everywhere.
+//! Files of SpikeSwarmSim, accepted unchanged. The files are not part of the project: without them,
+//! these tests report that and pass. Files of our own with all of their keys are tested everywhere.
 
 use std::{collections::BTreeSet, env, fs, io::Write as _};
 
@@ -89,7 +88,7 @@ fn keys(file: &Value) -> BTreeSet<String> {
 }
 
 #[test]
-fn keys_of_the_original_are_accepted_and_those_without_effect_are_named() {
+fn keys_of_the_original_are_accepted_and_ineffective_ones_are_named() {
     let general = ["num_processes", "render", "world.world_delay", "world.render_connections"];
     let of_light = ["world.objects.light_red.positions"];
     for (ours, theirs, more) in [

@@ -63,7 +63,7 @@ fn unknown_keys_missing_keys_and_wrong_types_do_not_fit_the_schema() {
 
 /// Every accepted file fits the schema, so the reader refuses every file that does not fit.
 #[test]
-fn what_the_reader_accepts_fits_the_schema() {
+fn accepted_files_fit_the_schema() {
     let schema = schema();
     let (mut n_refused_by_both, mut n_refused_by_reader) = (0, 0);
     for index in 0..(4 * n_files()).min(2_000) {

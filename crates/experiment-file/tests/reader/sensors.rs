@@ -5,7 +5,7 @@ use super::{BASE, accept, refuse};
 use experiment_file::ScriptSensorConfig;
 
 #[test]
-fn a_script_sensor_has_as_many_values_as_the_file_states_within_zero_and_one_unless_it_says_more() {
+fn a_script_sensor_has_n_values_between_its_bounds_by_default_zero_and_one() {
     let mounted = |params: &str| {
         let sensors = r#""sensors": {"wireless_receiver": {}, "light_sensor": {}"#;
         BASE.replace(sensors, &format!(r#"{sensors}, "script_sensor": {params}"#))

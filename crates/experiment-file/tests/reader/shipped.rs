@@ -41,8 +41,8 @@ fn shipped_files_are_accepted_without_warnings_under_their_own_names() {
     }
 }
 
-/// Three tasks, each with two neuron models, and with the trials and population of its file with
-/// rate neurons.
+/// Three tasks are shipped with two spiking neuron models each. Trials and population are those of
+/// the file with rate neurons.
 #[test]
 fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
     let rate = shipped();
@@ -71,7 +71,7 @@ fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
     assert_eq!(spiking.len(), 8);
 }
 
-/// They differ from the files of their tasks only in the network.
+/// The files differ from the files of their tasks only in the network.
 #[test]
 fn encoders_and_plasticity_are_shipped() {
     let spiking = spiking();
@@ -119,7 +119,7 @@ fn every_task_is_shipped_for_the_ga_and_for_snes() {
     assert_eq!(shipped.len(), 2 * tasks.len() + 1);
 }
 
-/// People who read the file see the constants without knowing the defaults.
+/// Readers of a file thus see the constants without knowing the defaults.
 #[test]
 fn shipped_files_state_every_constant_of_sensors_and_actuators() {
     for (stem, text) in shipped().into_iter().chain(spiking()) {

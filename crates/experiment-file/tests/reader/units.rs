@@ -48,7 +48,7 @@ fn a_file_in_the_right_units_has_no_warning() {
 }
 
 #[test]
-fn places_are_in_the_world_and_robots_not_on_top_of_each_other() {
+fn positions_outside_the_world_and_crowded_robots_are_doubted() {
     let at = "world.objects.bots.initializers.positions.params";
     for (name, params, key, likely) in [
         ("random_uniform", r#"{"low": 0, "high": 10000}"#, "high", CM_FOR_MM),
@@ -71,7 +71,7 @@ fn places_are_in_the_world_and_robots_not_on_top_of_each_other() {
 }
 
 #[test]
-fn angles_are_radians() {
+fn angles_in_degrees_are_doubted() {
     let at = "world.objects.bots.initializers.orientations.params";
     for (name, params, key) in [
         ("random_uniform", r#"{"low": 0, "high": 360}"#, "high"),
@@ -89,7 +89,7 @@ fn angles_are_radians() {
 }
 
 #[test]
-fn robots_and_what_they_sense_are_measured_in_cm() {
+fn lengths_in_other_units_than_cm_are_doubted() {
     let sensors = r#""wireless_receiver": {}, "light_sensor": {}"#;
     for (key, value, likely) in [
         ("range", "1001", CM_FOR_MM),
@@ -113,7 +113,8 @@ fn robots_and_what_they_sense_are_measured_in_cm() {
         ("axle_length", "0.053", CM_FOR_M),
         ("step_duration", "100", "ms instead of s"),
     ] {
-        // Nothing is nearer than a fast robot drives in a step.
+        // A fast robot drives farther in a step than its sensors reach, which gives further
+        // warnings.
         let to = format!(r#""wheel_actuator": {{"{key}": {value}}}"#);
         let warnings = warnings(&edited(r#""wheel_actuator": {}"#, &to));
         let path = format!("{at}.wheel_actuator.{key}: ");
@@ -140,7 +141,7 @@ fn robots_and_what_they_sense_are_measured_in_cm() {
 }
 
 #[test]
-fn times_are_shorter_than_a_trial() {
+fn times_longer_than_a_trial_are_doubted() {
     let exponent = "the time constant itself instead of its exponent";
     let bound = "algorithm.populations.neurons.max_vals[1]";
     doubted("[1.5, 0.75]", "[1.5, 4]", bound, exponent);
@@ -164,7 +165,7 @@ fn times_are_shorter_than_a_trial() {
 }
 
 #[test]
-fn spiking_neurons_have_milliseconds_and_millivolts() {
+fn seconds_and_volts_of_spiking_neurons_are_doubted() {
     let lif = include_str!("../../../../configs/spiking/leader_selection_lif.json");
     assert!(warnings(lif).is_empty());
     let mut file: serde_json::Value = serde_json::from_str(lif).unwrap();

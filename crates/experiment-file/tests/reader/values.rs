@@ -9,7 +9,8 @@ use experiment_file::{
     RewardConfig, RobotController, Seed, TopologyConfig, UncontrollableRotationConfig, json_schema,
 };
 
-/// An entry of `encoding` for the light of the light follower with LIF neurons, and plasticity.
+/// The light follower with LIF neurons, with this entry of `encoding` for its light and this
+/// `learning`.
 fn spiking_with(entry: &str, learning: &str) -> TopologyConfig {
     let text = include_str!("../../../../configs/spiking/light_follower_lif.json")
         .replace(r#""I5": {"scheme": "IdentityEncoding"}"#, &format!(r#""I5": {entry}"#))
@@ -76,7 +77,7 @@ fn a_seed_that_other_programs_would_round_is_text_and_both_forms_are_read() {
 }
 
 #[test]
-fn what_is_no_seed_is_refused_with_what_one_is() {
+fn invalid_seeds_are_refused_with_the_valid_forms() {
     for json in ["-1", "1.5", r#""""#, r#""+1""#, r#"" 1""#, r#""18446744073709551616""#, "null"] {
         let error = serde_json::from_str::<Seed>(json).unwrap_err().to_string();
         assert!(error.contains("or a text of its digits"), "{json}: {error}");
@@ -84,7 +85,7 @@ fn what_is_no_seed_is_refused_with_what_one_is() {
 }
 
 #[test]
-fn everything_learns_unless_a_file_says_what() {
+fn all_groups_learn_unless_a_file_names_some() {
     let identity = r#"{"scheme": "IdentityEncoding"}"#;
     let topology = spiking_with(identity, "{}");
     let learning = topology.learning.unwrap();
@@ -97,7 +98,7 @@ fn everything_learns_unless_a_file_says_what() {
 }
 
 #[test]
-fn what_a_file_omits_has_its_documented_default() {
+fn omitted_keys_have_their_documented_defaults() {
     let config = accept(BASE);
     assert_eq!((config.seed, config.topology.seed), (0, 821));
     assert_eq!((config.topology.dt, config.topology.time_scale), (0.1, 20));
@@ -187,7 +188,7 @@ fn light_controllers_have_three_forms() {
     assert_eq!(params(r#"{"every": 9, "step": 0.1}"#), random(9, None, Some(0.1)));
 }
 
-/// Keys of former constants: given values are kept, and defaults are omitted.
+/// These keys were constants before. The canonical form keeps stated values and omits defaults.
 #[test]
 fn constants_of_tasks_and_lights_are_keys_with_the_thesis_s_defaults() {
     let goto_light = r#""fitness_function": "goto_light""#;
@@ -300,7 +301,7 @@ pub(super) fn lamp(config: &ExperimentConfig) -> &LightSourceConfig {
 }
 
 #[test]
-fn a_perturbation_affects_all_robots_unless_it_says_how_many() {
+fn a_perturbation_affects_all_robots_unless_it_states_their_number() {
     let perturbation = r#""stimuli_inhibition": {"affected_robots": 2}"#;
     for form in [r#"{"affected_robots": "all"}"#, "{}"] {
         let config = accept(&edited(
@@ -324,7 +325,7 @@ fn a_perturbation_affects_all_robots_unless_it_says_how_many() {
 }
 
 #[test]
-fn inputs_that_the_network_does_not_get_are_named() {
+fn inputs_without_a_synapse_are_named() {
     let warnings = |pre: &str| {
         let text = edited(r#""pre": ["MSG", "LIGHT"]"#, &format!(r#""pre": {pre}"#));
         let (_, warnings) = read(&text).unwrap();

@@ -6,10 +6,10 @@ use super::{Doubts, step};
 use crate::report::Path;
 use crate::{FitnessParams, Initializer, LightController, ObjectConfig, OrbitConfig, RobotConfig};
 
-/// Sides of a world that robots of some centimetres live in, cm.
+/// Range of plausible sides of a world for robots of some centimetres, cm.
 const SIDE_MIN: f64 = 20.0;
 const SIDE_MAX: f64 = 10_000.0;
-/// Angles up to here are a full turn, generously rounded.
+/// Largest angle that counts as a full turn, with room for rounding.
 const TURN: f64 = TAU + 0.1;
 /// Speeds of wheels, cm/s: an e-puck has 13, a Khepera IV 81.
 const SPEED_MIN: f64 = 0.2;
@@ -17,11 +17,11 @@ const SPEED_MAX: f64 = 100.0;
 /// Distances between the wheels, cm: an e-puck has 5.3, a Pioneer 38.
 const AXLE_MIN: f64 = 0.5;
 const AXLE_MAX: f64 = 50.0;
-/// Angles of a light's orbit that are more than a jump in a step.
+/// Largest plausible angle of a light's orbit per step; with more, the light jumps.
 const ORBIT_MAX: f64 = 0.5;
 /// Largest plausible decay per cm: with more, nothing reaches the next robot.
 const DECAY_MAX: f64 = 2.0;
-/// Robots nearer than this are on top of each other, cm.
+/// Distance below which robots are on top of each other, cm.
 const APART: f64 = 1.0;
 
 const SMALLER: &str = "mm instead of cm";
@@ -215,7 +215,7 @@ fn headings(orientations: &Initializer, path: &Path, doubts: &Doubts<'_>) {
     }
 }
 
-/// The first of these headings that is more than a full turn.
+/// Warns of the first angle that is more than a full turn.
 fn angles<'a>(angles: impl Iterator<Item = &'a f64>, path: &Path, doubts: &Doubts<'_>) {
     let found = angles.enumerate().find(|(_, angle)| angle.abs() > TURN);
     if let Some((index, angle)) = found {

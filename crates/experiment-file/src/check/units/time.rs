@@ -6,7 +6,7 @@ use crate::{
     EnsembleConfig, EnsembleSelector, GenotypeQuery, NeuronParameter, RobotConfig, TopologyConfig,
 };
 
-/// Longest and shortest step of robots with wheels, s.
+/// Longest and shortest plausible step of robots with wheels, s.
 const STEP_MAX: f64 = 10.0;
 const STEP_MIN: f64 = 0.001;
 /// Longest step of a network of rate neurons, s.
@@ -78,7 +78,7 @@ fn perturbations(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
 
 fn never(step: u64, path: &Path, doubts: &Doubts<'_>) {
     let steps = doubts.config.algorithm.evaluation_steps;
-    let what = format!("{step} steps are not over in a trial of {steps}: it never happens");
+    let what = format!("a trial of {steps} steps never reaches step {step}");
     doubts.add(path, what, "ms instead of steps");
 }
 

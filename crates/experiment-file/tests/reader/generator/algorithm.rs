@@ -19,7 +19,7 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
         tasks.push("goto_light");
     }
     let queries = network.queries(dice);
-    // Coefficients of learning are more genes than algorithms with a full matrix take.
+    // Coefficients of learning are too many genes for algorithms with a full matrix.
     let learns = queries.iter().any(|(query, _)| query.starts_with("learning:"));
     let name = if learns && ["xNES", "CMA-ES"].contains(&name) { "sep-CMA-ES" } else { name };
     let n_populations = dice.die(queries.len().min(3));

@@ -11,7 +11,7 @@ pub(super) fn entry(dice: &mut Dice, n: usize, time_scale: usize) -> Value {
     } else {
         dice.pick(&["LIF_Encoding", "PoissonRateCoding"])
     };
-    // With one node per value, as many nodes as values.
+    // Rank order may not have more nodes, over all values, than substeps.
     let n_neurons = if scheme == "RankOrderCoding" { time_scale / n } else { 3 };
     let n_neurons = dice.die(n_neurons.min(3));
     let name = dice.pick(&[
@@ -56,7 +56,8 @@ pub(super) fn entry(dice: &mut Dice, n: usize, time_scale: usize) -> Value {
     if name != "gaussian_receptive_field" || dice.chance(0.5) {
         insert(&mut field, "name", json!(name));
     }
-    // The default current of LIF nodes is too small, and a field has one node per value.
+    // The default current of LIF nodes is too small, and by default a field has only one node per
+    // value.
     if scheme != "PoissonRateCoding" {
         insert(&mut field, "params", params);
     }

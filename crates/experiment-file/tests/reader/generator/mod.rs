@@ -91,7 +91,7 @@ fn experiment_with(dice: &mut Dice, share_of_spiking: f64) -> Value {
     file
 }
 
-/// Damages a file a little, or changes it to another valid one.
+/// Damages a file a little, or changes it to another valid file.
 pub(super) fn damage(dice: &mut Dice, value: &mut Value) {
     match value {
         Value::Object(map) if !map.is_empty() && dice.chance(0.95) => {

@@ -12,7 +12,7 @@ pub(super) struct Network {
     pub(super) topology: Value,
     model: NeuronModel,
     is_dynamic: bool,
-    /// Stimuli with an encoder; and those whose receptive field has weights.
+    /// Stimuli with an encoder, and stimuli whose receptive field has weights.
     encoded: Vec<String>,
     linear: Vec<String>,
     /// Groups of synapses that are plastic.
@@ -21,7 +21,7 @@ pub(super) struct Network {
     weighted: Vec<String>,
     ensembles: Vec<String>,
     motor: Vec<String>,
-    /// Name, starts, of every group that evolves.
+    /// Name and sources of every group that evolves.
     groups: Vec<(String, Vec<String>)>,
     pub(super) has_led: bool,
     pub(super) has_wheels: bool,
