@@ -149,7 +149,7 @@ def test_evolve_fails_like_swarmctl_run_with_the_same_words(still, programs, tmp
         told = []
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with pytest.raises(swarmevo.EvolutionError, match="nothing can be learnt from here") as caught:
+            with pytest.raises(swarmevo.EvolutionError, match="evolution can learn nothing from here") as caught:
                 swarmevo.evolve(
                     long, evaluate=evaluate, progress=False, data_dir=data_dir, callback=lambda it, _, told=told: told.append(it.index)
                 )

@@ -74,8 +74,8 @@ fn refusals(coordinator: &CoordinatorProcess) {
         (&["1@2/3"], 2, "is no generation"),
         (&["7@0"], 3, "there is no experiment 7"),
         (&["1@2", "--set", "algorithm.name=xNES"], 2, "algorithm.name: is xNES"),
-        (&["1@2", "--generations", "3"], 2, "algorithm.generations: is 3, and 3 are done"),
-        (&["1@2", "--set", "topology.ensembles.H1.n=9"], 2, "genes, and those of the state"),
+        (&["1@2", "--generations", "3"], 2, "algorithm.generations: is 3, but 3 are done"),
+        (&["1@2", "--set", "topology.ensembles.H1.n=9"], 2, "genes, but those of the state"),
         (&["1@2", "--set", "algorithm.populations.p1.params.eta_mu=0.5"], 2, "p1.params"),
         (&["1@2", "--set", "nonsense"], 2, "expected PATH=VALUE"),
     ] {

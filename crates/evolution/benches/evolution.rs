@@ -1,5 +1,5 @@
-//! Measures the coordinator's work per generation without its fitness: ask and tell of 100
-//! individuals with 445 genes, the size of experiment A.
+//! Measures the coordinator's work per generation, without fitness: ask and tell of 100 individuals
+//! with 445 genes, the size of experiment A.
 
 use divan::{Bencher, counter::ItemsCount};
 use evolution::{Evolution, Generation, Params, Setup};

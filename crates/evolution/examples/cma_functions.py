@@ -1,4 +1,4 @@
-"""What `functions.rs` prints, of the package `cma`: `python cma_functions.py [INDIVIDUALS] [EVALUATIONS]`.
+"""Prints the table of `functions.rs` for the package `cma`: `python cma_functions.py [INDIVIDUALS] [EVALUATIONS]`.
 
 `pip install cma==4.5.0 numpy`
 """

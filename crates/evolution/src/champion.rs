@@ -19,11 +19,11 @@ pub struct Champion {
     pub source: ChampionSource,
     /// Its genes.
     pub genotype: Genotype,
-    /// Fitness in the trials of its generation, which made it a candidate; empty for a mean,
-    /// which was not evaluated there.
+    /// Fitness in the trials of its generation, which made it a candidate; empty for a mean, which
+    /// is not evaluated in its generation.
     pub trial_fitness: Vec<f64>,
-    /// Fitness in all the held-out trials that compared it with other candidates; `None` before
-    /// the first re-evaluation.
+    /// Fitness in all held-out trials that compared the champion with other candidates; `None`
+    /// before the first re-evaluation.
     pub held_out: Option<HeldOut>,
     /// Fitness in trials that selected nothing, at the end of a run. Evolution does not need it,
     /// so checkpoints omit it.
@@ -46,9 +46,9 @@ pub enum ChampionSource {
 pub struct HeldOut {
     /// Mean over the trials.
     pub mean: Real,
-    /// 1.96 s / sqrt(n), s with divisor n - 1; 0 for a single trial, infinite if squares
-    /// overflow. It decides whether candidates are close. It is not an interval of the winner's
-    /// honest fitness.
+    /// 1.96 s / sqrt(n), s with divisor n - 1; 0 for a single trial, infinite if squares overflow.
+    /// This interval decides whether candidates are close. It is no confidence interval of the
+    /// winner's honest fitness.
     #[serde(deserialize_with = "interval_of_any_version")]
     pub ci95: Real,
     /// Number of trials n.
@@ -57,7 +57,7 @@ pub struct HeldOut {
     pub generation: u64,
 }
 
-/// Reads states of older versions, which may have NaN where sums overflowed. This stands for an
+/// Reads states of older versions, which may have NaN where sums overflowed. NaN stands for an
 /// unknown error of the mean, and becomes infinity, as in the database.
 fn interval_of_any_version<'de, D: Deserializer<'de>>(state: D) -> Result<Real, D::Error> {
     let unknown = Real::new(f64::INFINITY).expect("infinity is a number");
@@ -80,13 +80,13 @@ pub struct Judged {
 }
 
 impl Champion {
-    /// Mean fitness in the trials of its generation: optimistic.
+    /// Mean fitness in the trials of its generation. This estimate is optimistic.
     pub fn fitness(&self) -> Option<f64> {
         (!self.trial_fitness.is_empty()).then(|| mean(&self.trial_fitness))
     }
 }
 
-/// The 0.975 quantile of the normal distribution, with the digits of stored values.
+/// The 0.975 quantile of the normal distribution, rounded as in stored values.
 const Z: f64 = 1.96;
 
 impl HeldOut {
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn trials_of_two_rounds_count_as_if_they_were_of_one() {
+    fn trials_of_two_rounds_count_like_those_of_one() {
         let (first, later) = ([1.0, 2.0, 4.0], [8.0, 3.0]);
         let held_out =
             |values: &[f64], generation| HeldOut::from_values(values, generation).unwrap();

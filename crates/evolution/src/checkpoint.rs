@@ -1,10 +1,9 @@
 //! Checkpoints: the bytes from which evolution continues.
 //!
-//! A checkpoint is a *keyframe* and the entries of the [fitness log](super::Told) since. A
-//! keyframe is the whole state of evolution; an entry is the fitness of one generation, from
-//! which the next state follows. Keyframes that are far apart take little room, but then
-//! repeating the generations between them takes long: [`Evolution::is_keyframe_due`] weighs one
-//! against the other.
+//! A checkpoint is a *keyframe* and the entries of the [fitness log](super::Told) since. A keyframe
+//! is the whole state of evolution; an entry is the fitness of one generation, from which the next
+//! state follows. Keyframes that are far apart take little room, but repeating the generations
+//! between them takes long. [`Evolution::is_keyframe_due`] balances room and time.
 //!
 //! A keyframe begins with a byte for the version of its format; the rest is in the
 //! format of postcard (fields in order, without names; numbers as little-endian IEEE 754).
@@ -23,12 +22,12 @@ pub(crate) const VERSION: u8 = 1;
 /// Target for the time to repeat the generations between two keyframes, ns.
 const REPLAY_NS: u64 = 600_000_000;
 
-/// Most generations between two keyframes, as long as keyframes take at most
-/// [`ROOM_PER_GENERATION`].
+/// Most generations between two keyframes. Large keyframes are farther apart, so that they take at
+/// most [`ROOM_PER_GENERATION`].
 const GENERATIONS_MAX: u64 = 150;
 
-/// Bytes of keyframes per generation, if the log takes less. This limit determines the distance
-/// for large populations and matrices.
+/// Most bytes of keyframes per generation, if the log takes less. For large populations and
+/// matrices, this limit determines the distance between keyframes.
 const ROOM_PER_GENERATION: u64 = 128 << 10;
 
 /// The data from which an evolution can be restored.
@@ -43,11 +42,11 @@ pub struct Checkpoint {
     pub n_flat: u64,
 }
 
-/// Why a checkpoint cannot be read: it is damaged, or of another version.
+/// Why a checkpoint cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// Written by another version.
-    #[error("it has the format {found}, and this program reads {supported}")]
+    #[error("it has the format {found}, but this program reads {supported}")]
     Version {
         /// Its first byte.
         found: u8,
@@ -58,12 +57,12 @@ pub enum CheckpointError {
     #[error("it cannot be read: {0}")]
     Malformed(#[from] postcard::Error),
     /// A log entry does not fit the state, for example because it belongs to another experiment.
-    #[error("the fitness of generation {generation} does not fit")]
+    #[error("the fitness of generation {generation} does not fit the state of evolution")]
     Misfit {
         /// Index of the generation.
         generation: u64,
     },
-    /// Fitness that evolution cannot have learnt from.
+    /// The log has fitness from which evolution cannot have learnt.
     #[error(transparent)]
     Evolution(#[from] EvolutionError),
 }

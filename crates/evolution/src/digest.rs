@@ -11,11 +11,11 @@
 //! extra link follows the parent's last one: SHA-256 of `swarmevo fork digest 1\n`, the parent's
 //! last link, and link -1 of the changed configuration.
 //!
-//! Re-evaluations of candidates have a chain of their own, which depends on the first chain. It
-//! starts with 32 zero bytes. After each block of held-out trials, the next link is SHA-256 of
-//! the previous link, the link of the latest generation, every gene of every candidate that met
-//! the block, and every fitness of every trial of each. The judgement of the champion adds a link
-//! in the same way.
+//! Re-evaluations of candidates have a chain of their own, which depends on the first chain. This
+//! chain starts with 32 zero bytes. After each block of held-out trials, the next link is SHA-256
+//! of the previous link, the link of the latest generation, every gene of every candidate that met
+//! the block, and the fitness of each of these candidates in every trial. The judgement of the
+//! champion adds a link in the same way.
 
 use std::{fmt, str::FromStr};
 

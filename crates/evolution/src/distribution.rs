@@ -1,6 +1,6 @@
-//! The distribution of a generation, with which other machines draw its genotypes.
+//! The distribution of a generation, from which other machines draw its genotypes.
 //!
-//! If an algorithm draws individuals one by one, any of them can be drawn alone, because its
+//! If an algorithm draws individuals one by one, any individual can be drawn alone, because its
 //! draws have a fixed place in the stream of the generation. The result has the same bits as
 //! [`Evolution::ask`]. The distribution has two to four numbers per gene, instead of one per gene
 //! and individual.
@@ -25,7 +25,7 @@ pub struct Distribution {
 }
 
 impl Evolution {
-    /// The distribution of the next generation, as bytes in the format of keyframes; `None` if an
+    /// The distribution of the next generation, as bytes in the format of keyframes. `None` if an
     /// algorithm does not draw individuals one by one.
     pub fn distribution(&self) -> Option<Vec<u8>> {
         let are_single = self.populations.iter().all(Algorithm::draws_one_by_one);

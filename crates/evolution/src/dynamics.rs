@@ -24,7 +24,7 @@ pub struct Dynamics {
 }
 
 impl Evolution {
-    /// Repeats a generation, and measures its change of evolution.
+    /// Repeats a generation, and measures how it changes evolution.
     ///
     /// # Errors
     ///
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn every_distribution_says_how_far_it_went_and_how_wide_it_is() {
+    fn every_distribution_reports_its_step_and_its_width() {
         for algorithm in ALGORITHMS {
             let mut evolution = Setup::new(algorithm.name, 6).start().unwrap();
             let mut same = evolution.clone();
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_have_the_deviations_that_are_said() {
+    fn samples_have_the_reported_deviations() {
         for name in ["SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES"] {
             let setup = Setup { population_size: 4000, ..Setup::new(name, 2) };
             let evolution = setup.start().unwrap();

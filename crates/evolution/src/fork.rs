@@ -63,13 +63,13 @@ impl Evolution {
         let mut problems = Vec::new();
         if parent.name != child.name {
             problems.push(format!(
-                "algorithm.name: is {}, and the state is one of {}",
+                "algorithm.name: is {}, but the state is of {}",
                 child.name, parent.name
             ));
         }
         if child.generations <= self.n_generations {
             problems.push(format!(
-                "algorithm.generations: is {}, and {} are done; ask for more",
+                "algorithm.generations: is {}, but {} are done; ask for more",
                 child.generations, self.n_generations
             ));
         }
@@ -78,7 +78,7 @@ impl Evolution {
         let of_child: Vec<&str> = child.populations.iter().map(|(name, _)| &**name).collect();
         if of_parent != of_child {
             problems.push(format!(
-                "algorithm.populations: are {}, and those of the state {}",
+                "algorithm.populations: are {}, but those of the state are {}",
                 names(&of_child),
                 names(&of_parent)
             ));
@@ -98,8 +98,8 @@ impl Evolution {
             let (n_now, n_before) = (segment.len(), state.n_genes());
             if n_now != n_before {
                 problems.push(format!(
-                    "algorithm.populations.{name}: its genotypes have {n_now} genes, and those of \
-                     the state {n_before}"
+                    "algorithm.populations.{name}: its genotypes have {n_now} genes, but those of \
+                     the state have {n_before}"
                 ));
             }
         }

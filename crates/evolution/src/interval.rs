@@ -18,9 +18,9 @@ const N_HALVINGS: u32 = 60;
 /// Largest absolute exponent of two in the search.
 const EXPONENT_MAX: f64 = 60.0;
 
-/// The 95 % confidence interval of the mean; `None` without values, or if one is not finite. If
-/// all values are equal, or if there is only one, both ends are that value, because the interval
-/// never leaves the range of the values.
+/// The 95 % confidence interval of the mean; `None` without values, or if one is not finite. The
+/// interval never leaves the range of the values: if all values are equal, both ends are that
+/// value.
 pub fn interval(values: &[f64]) -> Option<(Real, Real)> {
     if values.is_empty() || values.iter().any(|value| !value.is_finite()) {
         return None;
@@ -35,7 +35,7 @@ fn upper_end(values: &[f64]) -> f64 {
     if min == max {
         return max;
     }
-    // Scaling by a power of two leaves the bits of all steps alone, unless they would overflow or
+    // Scaling by a power of two changes no significant bit, unless a number would overflow or
     // underflow. The range itself may overflow.
     let range = max - min;
     let exponent =
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_spread_is_a_point_and_what_is_not_finite_has_no_interval() {
+    fn equal_values_have_a_point_as_interval_and_non_finite_values_have_none() {
         assert_eq!(ends(&[0.25]), (0.25, 0.25));
         assert_eq!(ends(&[0.25; 9]), (0.25, 0.25));
         assert_eq!(interval(&[]), None);
@@ -169,7 +169,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn scaling_keeps_every_bit_of_what_is_a_number_without_it(
+        fn scaling_keeps_every_bit_of_ends_that_are_numbers_without_it(
             values in prop::collection::vec(-1e9f64..1e9, 1..60),
             exponent in -600i32..600,
             offset in -1e12f64..1e12,
@@ -192,7 +192,7 @@ mod tests {
         }
 
         #[test]
-        fn values_within_a_hair_have_an_interval_like_any_others(
+        fn the_smallest_numbers_have_an_interval_like_any_others(
             steps in prop::collection::vec(0u64..1000, 2..40),
         ) {
             // The smallest positive numbers, and the same numbers scaled to integers.

@@ -38,12 +38,12 @@
 //!   not depend on machine, threads or time. [`Evolution::digest`] is a hash of all
 //!   genotypes and fitness so far: equal digests mean equal runs, bit for bit.
 //! - The best of noisy evaluations is optimistic. [`Evolution::reevaluation`] names candidates to
-//!   evaluate again on held-out trials, and [`Evolution::set_champion`] keeps the best of them.
-//!   At the end of a run, [`Evolution::judgement`] measures its honest fitness, on trials that
-//!   selected nothing.
+//!   evaluate again on held-out trials, and [`Evolution::set_champion`] keeps the best of them. At
+//!   the end of a run, [`Evolution::judgement`] measures the champion's honest fitness, on trials
+//!   that selected nothing.
 //!
-//! An algorithm only samples and updates; all share statistics, champion, digest and the rule for
-//! fitness that is not finite.
+//! An algorithm only samples and updates. All algorithms share statistics, champion, digest and the
+//! rule for fitness that is not finite.
 
 mod algorithms;
 mod champion;
@@ -113,7 +113,8 @@ pub struct Evolution {
     /// The best individual since the last re-evaluation.
     challenger: Option<Champion>,
     digest: Digest,
-    /// Covers every re-evaluation so far, and all generations before the latest one.
+    /// The last link of the re-evaluations' chain, which covers the generations before the latest
+    /// re-evaluation.
     champion_digest: Digest,
     #[serde(skip)]
     n_flat: FlatGenerations,
@@ -141,7 +142,7 @@ pub struct GenerationSummary {
     /// Number of individuals without finite fitness; they rank last.
     pub n_non_finite: usize,
     /// Number of latest generations, including this one, in which all individuals had the same
-    /// fitness; 0 if some differ in this one.
+    /// fitness; 0 if this generation has different fitness.
     pub n_flat: u64,
     /// Link of the digest chain.
     pub digest: Digest,

@@ -27,9 +27,9 @@ pub enum Parents {
 pub enum GeneSource {
     /// The first parent has the same gene.
     First,
-    /// The second parent has the same gene, and the first has not.
+    /// Only the second parent has the same gene.
     Second,
-    /// No parent: the gene mutated, or blends both.
+    /// No parent has the same gene: it mutated, or blends both parents.
     New,
 }
 
@@ -92,7 +92,7 @@ pub struct BirthOf {
     pub n_new: usize,
 }
 
-/// How a genotype came about.
+/// The operator that made a genotype.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Operator {
     /// Drawn at random, for the first generation.

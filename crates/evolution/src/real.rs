@@ -4,16 +4,16 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A number that is not NaN. Stored and displayed fitness uses this type, so that no NaN reaches
-/// a database. Statistics of finite fitness are finite; databases of older versions have infinite
-/// ones where sums overflowed.
+/// A number that is not NaN. Stored and displayed fitness uses this type, so that no NaN reaches a
+/// database. Statistics of finite fitness are finite; databases of older versions have infinite
+/// statistics where sums overflowed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, PartialOrd, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct Real(f64);
 
 /// The value is NaN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("NaN where a number is due")]
+#[error("NaN instead of a number")]
 pub struct NotANumber;
 
 impl Real {

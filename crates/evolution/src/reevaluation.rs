@@ -1,9 +1,9 @@
 //! The re-evaluation of candidates for the champion.
 //!
 //! Every candidate meets a block of held-out trials. The leader is the candidate with the largest
-//! mean over all held-out trials that it has ever met. Candidates that are not close to the
-//! leader are out. While several candidates are left, those among them with the fewest trials
-//! meet another block, up to [`BLOCKS_MAX`] in all. Then the leader becomes the champion.
+//! mean over all held-out trials that it has ever met. Candidates that are not close to the leader
+//! are out. While several candidates are left, the candidates with the fewest trials meet another
+//! block, up to [`BLOCKS_MAX`] blocks in all. Then the leader becomes the champion.
 
 use determinism::random::TrialSet;
 
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_has_met_more_trials_waits_for_the_others() {
+    fn candidates_with_more_trials_wait_for_the_others() {
         let known = HeldOut::from_values(&[around(5.0), around(5.0)].concat(), 3);
         let mut round = reevaluation(&[known, None]);
         round.learn(&[around(5.0), around(5.5)]);
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn one_lucky_block_does_not_beat_what_is_known_of_many() {
+    fn one_lucky_block_does_not_beat_a_mean_of_many_blocks() {
         let known = HeldOut::from_values(&[around(5.0), around(5.0), around(5.0)].concat(), 3);
         let mut round = reevaluation(&[known, None]);
         round.learn(&[around(2.0), around(5.1)]);
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn of_equals_the_first_wins_and_gets_no_more_trials() {
+    fn the_first_of_equal_candidates_wins_without_more_trials() {
         let mut round = reevaluation(&[None, None]);
         round.learn(&[vec![1.0], vec![1.0]]);
         assert!(round.is_over());

@@ -1,4 +1,4 @@
-//! Repeats recorded generations: the evaluations of each, and its results.
+//! Repeats recorded generations, with their evaluations and results.
 
 use determinism::random::TrialSet;
 
@@ -94,7 +94,7 @@ impl Evolution {
         Ok(Outcome { champion: Some(champion), digest, rounds })
     }
 
-    /// Repeats a re-evaluation; `None` if the blocks do not fit one.
+    /// Repeats a re-evaluation. Returns `None` if the blocks do not fit the candidates.
     fn repeat<'a>(
         &self,
         blocks: &'a [Vec<Vec<f64>>],

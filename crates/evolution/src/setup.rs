@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn a_setup_is_refused_with_everything_that_is_wrong() {
+    fn all_mistakes_of_a_setup_are_reported() {
         let params = Params::default().with("sigma_init", 2.0).with("eta_mu", 1.0);
         let setup = Setup { params, population_size: 1, ..Setup::new("CMA-ES", 1001) };
         let expected = [
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_setup_says_enters_the_digest() {
+    fn every_part_of_a_setup_enters_the_digest() {
         let digest = |setup: Setup| setup.start().unwrap().digest();
         let base = || Setup::new("SNES", 2);
         let eta = Params::default().with("eta_mu", 0.5);

@@ -1,20 +1,21 @@
 //! Detects evolution that learns nothing: equal fitness of all individuals, and distributions
 //! that are as narrow as a point or far wider than the genes' range.
 //!
-//! It changes no bit of a run. It writes notices, and ends a run that continues by chance alone.
+//! This module changes no bit of a run. It writes notices, and ends a run that continues by chance
+//! alone.
 
 use super::{
     Evolution, EvolutionError, Generation, GenerationSummary, Told, algorithms::Strategy as _,
     means,
 };
 
-/// The number of latest generations in which all individuals had equal fitness. It is not part of
-/// the state, so comparisons ignore it; a restored state counts again in the fitness log.
+/// The number of latest generations in which all individuals had equal fitness. The number is not
+/// part of the state, so comparisons ignore it. A restored state counts again from the fitness log.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FlatGenerations(pub u64);
 
 impl FlatGenerations {
-    /// The number after another generation.
+    /// The number after the next generation.
     pub fn next(self, is_flat: bool) -> Self {
         if is_flat { Self(self.0 + 1) } else { Self(0) }
     }
@@ -26,16 +27,15 @@ impl PartialEq for FlatGenerations {
     }
 }
 
-/// After this many generations without a difference there is a notice, and again after ten times
-/// as many.
+/// A notice follows after this many generations without a difference, and again after ten times as
+/// many.
 const FLAT_MIN: u64 = 10;
 
 /// After this many generations without a difference, a distribution wider than [`DEVIATION_MAX`]
 /// ends the run.
 const FLAT_MAX: u64 = 100;
 
-/// Number of generations before a restored state to look at when counting: more than the number
-/// that ends a run.
+/// Most generations to count before a restored state: more than the number that ends a run.
 pub const FLAT_COUNTED_MAX: u64 = 10 * FLAT_MAX;
 
 /// Deviation of genes, whose range is 1, from which evolution cannot recover: individuals are
@@ -55,7 +55,8 @@ const DEVIATION_WIDE: f64 = 1e3;
 #[error(
     "all individuals had the same fitness {fitness} in each of the last {n_generations} generations, \
      and chance has driven the deviations of the genes, whose range is 1, to {deviation:.0e}; \
-     nothing can be learnt from here: let the task tell individuals apart, and submit it again"
+     evolution can learn nothing from here on: let the task tell individuals apart, and submit it \
+     again"
 )]
 pub struct Drifted {
     /// The fitness of all individuals.
@@ -73,7 +74,7 @@ pub struct Learnt {
     pub summary: GenerationSummary,
     /// Notices for people.
     pub notices: Vec<String>,
-    /// Why it is the last generation, if it is; empty if all generations are done.
+    /// Why the generation is the last one; `None` if it is not, empty if all generations are done.
     pub completed: Option<String>,
 }
 
@@ -108,7 +109,7 @@ impl Evolution {
     /// # Errors
     ///
     /// As [`tell`](Self::tell), and if the run should end because evolution can no longer learn
-    /// anything. After an error, the evolution is of no use.
+    /// anything. After an error, the evolution cannot be used.
     pub fn learn(
         &mut self,
         generation: Generation,
@@ -138,8 +139,8 @@ impl Evolution {
         of_each.flatten().reduce(f64::max)
     }
 
-    /// The notices after a generation. `widest_before`: [`widest`](Self::widest) before it;
-    /// `is_last`: whether it is the last one of the run.
+    /// The notices after a generation. `widest_before`: [`widest`](Self::widest) before the
+    /// generation. `is_last`: whether the generation is the last of the run.
     pub(crate) fn remarks(
         &self,
         widest_before: Option<f64>,
@@ -156,15 +157,16 @@ impl Evolution {
         if was >= DEVIATION_NARROW && is < DEVIATION_NARROW {
             remarks.push(format!(
                 "generation {}: the deviations of all genes are below {DEVIATION_NARROW:e}, so all \
-                 individuals are alike; end the run here, or start another one with a wider \
+                 individuals are alike; end the run here, or start another run with a wider \
                  `sigma_init`, another seed or more individuals",
                 summary.generation
             ));
         }
         if was <= DEVIATION_WIDE && is > DEVIATION_WIDE {
             remarks.push(format!(
-                "generation {}: the deviation of a gene is {is:.0e}, and its range is 1, so it is drawn \
-                 at random; fitness does not depend on it, or the learning rates are too large",
+                "generation {}: the deviation of a gene is {is:.0e}, but its range is 1, so it is drawn \
+                 at random; fitness does not depend on this gene, or the learning rates are too \
+                 large",
                 summary.generation
             ));
         }
@@ -177,7 +179,7 @@ impl Evolution {
         format!(
             "generations {first} to {last}: all {} individuals have the same fitness {fitness}, so evolution drifts by \
              chance; let the task reward steps towards its goal, or check that its fitness depends on \
-             what robots do (`swarmctl simulate`)",
+             the robots' actions (`swarmctl simulate`)",
             self.population_size
         )
     }

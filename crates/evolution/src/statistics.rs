@@ -27,7 +27,7 @@ impl Statistics {
     /// If no value is finite.
     pub fn from_fitness(fitness: &[f64]) -> Self {
         let finite: Vec<f64> = fitness.iter().copied().filter(|value| value.is_finite()).collect();
-        let expected = "a generation without finite fitness fails before";
+        let expected = "a generation without finite fitness fails earlier";
         let mean = finite_mean(&finite).expect(expected);
         let (min, max) = bounds(&finite);
         Self {
@@ -83,7 +83,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// All finite numbers, extreme ones often.
+    /// All finite numbers, often extreme numbers.
     pub(crate) fn any_finite() -> impl Strategy<Value = f64> {
         let extreme = [0.0, -0.0, f64::MAX, f64::MIN, 5e-324, -5e-324, 1e308, 1.0, f64::EPSILON];
         prop_oneof![
@@ -115,7 +115,7 @@ pub(crate) mod tests {
         }
 
         #[test]
-        fn what_was_finite_without_scaling_keeps_every_bit(
+        fn statistics_that_are_finite_without_scaling_keep_every_bit(
             values in prop::collection::vec(any_finite(), 1..40),
         ) {
             let Statistics { mean, standard_deviation, .. } = Statistics::from_fitness(&values);

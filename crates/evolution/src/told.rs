@@ -1,7 +1,7 @@
 //! The fitness log: the input of evolution, generation by generation.
 //!
-//! [`ask`](super::Evolution::ask) and [`tell`](super::Evolution::tell) are functions, so the log
-//! and one state of evolution determine every later state, and every genotype:
+//! [`ask`](super::Evolution::ask) and [`tell`](super::Evolution::tell) are pure functions, so the
+//! log and one state of evolution determine every later state, and every genotype:
 //! [`replay`](super::Evolution::replay) repeats them.
 //!
 //! An entry begins with a byte for the version of its format; the rest is in the format of
@@ -25,14 +25,14 @@ const WITHOUT_END: u8 = 1;
 pub struct Told {
     /// Fitness of every individual in every trial; shape `[individual][trial]`.
     pub trial_fitness: Vec<Vec<f64>>,
-    /// Fitness in the re-evaluation after the generation; shape `[block][candidate][trial]`.
-    /// Empty without a re-evaluation, or if it belongs to [`end`](Self::end).
+    /// Fitness in the re-evaluation after the generation; shape `[block][candidate][trial]`. Empty
+    /// without a re-evaluation, or if the re-evaluation is in [`end`](Self::end).
     pub blocks: Vec<Vec<Vec<f64>>>,
     /// The evaluations at the end of the run.
     pub end: End,
 }
 
-/// The evaluations at the end of a run. A longer run continues as if they had not happened.
+/// The evaluations at the end of a run. If the run is continued, they have no effect.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct End {
     /// The blocks of an extra re-evaluation, as in [`Told::blocks`].

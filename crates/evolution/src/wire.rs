@@ -10,8 +10,8 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use super::CheckpointError;
 
-/// Most lists, options and integers in a value: more than a state of evolution has with the
-/// largest number of individuals, in forty populations.
+/// Most lists, options and integers in a value: more than in a state of evolution with forty
+/// populations and the largest number of individuals.
 const SMALL_MAX: usize = 4 << 20;
 
 /// Encodes a value in this version of its format.
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_written_reads_back() {
+    fn written_values_read_back() {
         let value = (vec![vec![0.1, -0.0], Vec::new()], Some(300_u64), true);
         let bytes = encode(3, &value);
         assert_eq!(decode::<(Vec<Vec<f64>>, Option<u64>, bool)>(3, &bytes).unwrap(), value);
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_number_of_lists_is_bounded_and_that_of_their_numbers_is_not() {
+    fn the_number_of_lists_is_bounded_but_not_their_length() {
         let lists = |n_lists: usize, len: usize| encode(1, &vec![vec![0.5; len]; n_lists]);
         let read = |n, bytes: &[u8]| decode_at_most::<Vec<Vec<f64>>>(n, 1, bytes);
         // The length of the whole list counts as a number, too.

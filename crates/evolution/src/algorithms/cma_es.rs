@@ -1,8 +1,8 @@
 //! Covariance matrix adaptation evolution strategy, with cumulation, rank-one
 //! and rank-mu updates and negative weights.
 //!
-//! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772 (2016,
-//! revised 2023); equation numbers are its own.
+//! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772 (2016, revised 2023);
+//! equation numbers refer to this paper.
 
 use determinism::random::Stream;
 use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom, Params, limits};

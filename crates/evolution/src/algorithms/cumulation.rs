@@ -1,8 +1,8 @@
 //! The common part of CMA-ES and sep-CMA-ES: evolution paths and the cumulative adaptation of the
 //! step size.
 //!
-//! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772; equation
-//! numbers are its own.
+//! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772; equation numbers refer to
+//! this paper.
 
 use serde::{Deserialize, Serialize};
 

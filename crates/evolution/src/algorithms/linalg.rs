@@ -1,10 +1,10 @@
-//! Matrices: storage of symmetric ones, eigendecomposition, products.
+//! Matrices: storage of symmetric matrices, eigendecomposition, products.
 //!
 //! Every result has the same bits on every machine. This module uses only those operations of
-//! nalgebra that consist of +, -, *, / and square roots in a fixed order. nalgebra is built
-//! without its `matrixmultiply` kernels, which choose instructions by the processor, and with
-//! `libm-force`. Products of matrices consist of products with vectors, which never reach such
-//! kernels, whatever features are on.
+//! nalgebra that consist of +, -, *, / and square roots in a fixed order. nalgebra is built without
+//! its `matrixmultiply` kernels, which choose instructions by the processor, and with `libm-force`.
+//! Products of matrices consist of products with vectors, which never use such kernels, under any
+//! features.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn products_are_those_of_the_library() {
+    fn products_agree_with_the_library() {
         let (a, b) = (random_factor(7, 5), random_factor(5, 6));
         assert!((product(&a, &b) - a * b).amax() < 1e-14);
     }

@@ -49,9 +49,9 @@ const ETA_B: Parameter = Parameter::computed(
 );
 /// The name of the faster rates.
 const FAST: &str = "fast";
-/// Chooses between the paper's rates and faster ones: a step size that learns as fast as SNES's
-/// deviations, and a shape that learns twice as fast as the paper's. The canonical form omits an
-/// absent key, because older files lack it.
+/// Chooses between the paper's rates and faster rates. With the faster rates, the step size learns
+/// as fast as SNES's deviations, and the shape learns twice as fast as the paper's. The canonical
+/// form omits an absent key, because older files lack it.
 const RATES: Parameter = Parameter::of(
     "rates",
     Domain::OneOf { names: &["paper", FAST], unsupported: &[] },

@@ -107,7 +107,7 @@ fn remarks(
 }
 
 #[test]
-fn fitness_that_tells_nobody_apart_is_said_after_ten_generations_and_ever_more_rarely() {
+fn equal_fitness_gives_a_notice_after_ten_generations_and_then_ever_more_rarely() {
     for algorithm in ALGORITHMS {
         let (remarks, _) = remarks(&mut started(algorithm.name, 100), 10, flat);
         let expected = "generations 0 to 9: all 100 individuals have the same fitness 0.25, ";
@@ -122,7 +122,7 @@ fn fitness_that_tells_nobody_apart_is_said_after_ten_generations_and_ever_more_r
 }
 
 #[test]
-fn fitness_that_tells_individuals_apart_is_no_news() {
+fn fitness_that_differs_gives_no_notice() {
     for algorithm in ALGORITHMS {
         let (remarks, drifted) = remarks(&mut started(algorithm.name, 20), 30, sphere);
         assert_eq!((remarks, drifted), (vec![], None), "{}", algorithm.name);
@@ -150,7 +150,7 @@ fn a_distribution_that_chance_has_driven_out_of_all_bounds_ends_the_run() {
 }
 
 #[test]
-fn a_distribution_that_shrinks_to_a_point_is_said_once() {
+fn a_distribution_that_shrinks_to_a_point_gives_one_notice() {
     let (remarks, _) = remarks(&mut started("SNES", 12), 3000, sphere);
     let narrow =
         remarks.iter().filter(|remark| remark.contains("all individuals are alike")).count();
@@ -158,7 +158,7 @@ fn a_distribution_that_shrinks_to_a_point_is_said_once() {
 }
 
 #[test]
-fn generations_without_a_difference_are_no_part_of_the_state_but_go_on_from_a_checkpoint() {
+fn the_number_of_flat_generations_is_no_part_of_the_state_but_continues_from_a_checkpoint() {
     let mut evolution = started("SNES", 4);
     let begun = evolution.keyframe();
     remarks(&mut evolution, 12, flat);
@@ -173,7 +173,7 @@ fn generations_without_a_difference_are_no_part_of_the_state_but_go_on_from_a_ch
 }
 
 #[test]
-fn fitness_tells_nobody_apart_if_it_is_finite_and_the_same_for_several() {
+fn a_generation_is_flat_if_several_individuals_have_the_same_finite_fitness() {
     let is_flat = |means: &[f64]| {
         Told::from_fitness(means.iter().map(|&mean| vec![mean, mean]).collect()).is_flat()
     };
@@ -183,7 +183,7 @@ fn fitness_tells_nobody_apart_if_it_is_finite_and_the_same_for_several() {
 }
 
 #[test]
-fn populations_that_teach_nothing_are_warned_of_and_others_are_not() {
+fn only_populations_too_small_to_learn_from_give_a_warning() {
     let advice = |name: &str, population_size| {
         AlgorithmDescription::find(ALGORITHMS, name).unwrap().advice(population_size)
     };
@@ -198,7 +198,7 @@ fn populations_that_teach_nothing_are_warned_of_and_others_are_not() {
 }
 
 #[test]
-fn a_file_with_a_single_individual_is_taken_with_a_warning() {
+fn a_file_with_a_single_individual_is_accepted_with_a_warning() {
     let file = include_str!("../../../../configs/quickstart.json")
         .replace(r#""population_size": 32"#, r#""population_size": 1"#);
     let (config, warnings) = ExperimentConfig::from_json(&file, "", ALGORITHMS).unwrap();

@@ -214,7 +214,7 @@ fn openai_es() {
 }
 
 #[test]
-fn fast_rates_of_xnes_solve_in_8000_evaluations_what_those_of_the_paper_do_not() {
+fn xnes_solves_a_function_in_8000_evaluations_with_fast_rates_only() {
     let missing = |rates: &str| {
         let params = Params::default().with("rates", rates);
         let mut evolution = Setup { params, ..Setup::new("xNES", 20) }.start().unwrap();

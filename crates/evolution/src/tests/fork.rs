@@ -43,7 +43,7 @@ fn a_fork_that_changes_nothing_has_the_digests_of_its_parent() {
 }
 
 #[test]
-fn where_a_fork_comes_from_and_what_is_changed_are_part_of_its_digests() {
+fn the_origin_and_the_changes_of_a_fork_enter_its_digests() {
     let parent = parent("SNES");
     let change = |change: fn(&mut ExperimentConfig)| {
         let mut child = parent.clone();
@@ -59,7 +59,7 @@ fn where_a_fork_comes_from_and_what_is_changed_are_part_of_its_digests() {
     ];
     let digests = forks.iter().chain([&unchanged]).map(|fork| fork.digest().to_string());
     assert_eq!(digests.collect::<std::collections::BTreeSet<_>>().len(), 5);
-    // The link of a fresh run of the same file is another one, too.
+    // A fresh run of the same file has another link, too.
     let mut other = parent.clone();
     other.world.height = 500.0;
     assert_ne!(forks[1].digest(), Digest::of_config(&other, SIMULATION));
@@ -72,7 +72,7 @@ fn where_a_fork_comes_from_and_what_is_changed_are_part_of_its_digests() {
 }
 
 #[test]
-fn what_a_state_cannot_carry_is_refused_by_name_and_all_at_once() {
+fn impossible_changes_are_refused_by_name_and_all_at_once() {
     let parent = parent("SNES");
     let mut child = config("xNES", 6, &["a", "b"]);
     child.algorithm.generations = 4;

@@ -50,7 +50,7 @@ fn champion_of_a_run(seed: u64) -> Champion {
 }
 
 #[test]
-fn champions_are_worth_what_their_judgement_says() {
+fn the_judgement_of_champions_is_unbiased_and_selection_is_optimistic() {
     let champions: Vec<Champion> = (0..200).map(champion_of_a_run).collect();
     let errors = |claim: fn(&Champion) -> f64| -> (f64, f64) {
         let errors: Vec<f64> =
@@ -61,7 +61,7 @@ fn champions_are_worth_what_their_judgement_says() {
     let (error, ci95) = errors(|champion| champion.judged.unwrap().mean.get());
     assert!(error.abs() < ci95, "{error} +- {ci95}");
     let (error, ci95) = errors(|champion| champion.held_out.unwrap().mean.get());
-    assert!(error > ci95, "what selected them is optimistic: {error} +- {ci95}");
+    assert!(error > ci95, "the selecting mean is optimistic: {error} +- {ci95}");
 
     let is_covered = |champion: &&Champion| {
         let Judged { low, high, .. } = champion.judged.unwrap();

@@ -1,4 +1,4 @@
-//! Lineages: parents have the genes that their children have from them.
+//! Lineages: children have the genes of the parents that a lineage names.
 
 use super::*;
 use crate::{Operator, Pedigree, Setup};

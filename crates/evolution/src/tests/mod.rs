@@ -100,7 +100,11 @@ fn choose(evolution: &mut Evolution, fitness: &[f64]) {
 #[test]
 fn champions_are_kept_by_their_held_out_fitness() {
     let mut evolution = evolution(3, &[2]);
-    assert_eq!(evolution.reevaluation(), None, "there is nobody before the first generation");
+    assert_eq!(
+        evolution.reevaluation(),
+        None,
+        "there are no individuals before the first generation"
+    );
     let tell = |evolution: &mut Evolution, best: f64| {
         let generation = evolution.ask();
         evolution.tell(generation, &[vec![0.0], vec![best], vec![-1.0]]).unwrap();
@@ -116,9 +120,9 @@ fn champions_are_kept_by_their_held_out_fitness() {
     choose(&mut evolution, &[5.0, 1.0]);
     let champion = evolution.champion().unwrap().clone();
     assert_eq!(champion.held_out.unwrap().mean, 5.0);
-    assert_eq!(evolution.digest(), digest, "the generations' chain is not touched");
+    assert_eq!(evolution.digest(), digest, "the generations' chain stays");
 
-    // From now on, a better estimate alone does not make a champion.
+    // From now on, a better estimate alone makes no champion.
     tell(&mut evolution, 99.0);
     assert_eq!(evolution.champion(), Some(&champion));
     let second = evolution.reevaluation().unwrap();
@@ -141,9 +145,9 @@ fn champions_are_kept_by_their_held_out_fitness() {
 }
 
 #[test]
-fn a_judgement_changes_nothing_of_evolution_and_has_a_link_of_its_own() {
+fn a_judgement_does_not_change_evolution_and_has_its_own_link() {
     let mut evolution = evolution(3, &[2]);
-    assert_eq!(evolution.judgement(), None, "there is nobody before the first generation");
+    assert_eq!(evolution.judgement(), None, "there are no individuals before the first generation");
     step(&mut evolution);
     choose(&mut evolution, &[5.0, 1.0]);
     let judgement = evolution.judgement().unwrap();
@@ -287,7 +291,7 @@ fn the_name_in_the_configuration_chooses_the_algorithm() {
 }
 
 /// Databases have keyframes and logs of this format. A change needs a new version, and code that
-/// reads the former one.
+/// reads the previous version.
 #[test]
 fn the_formats_of_keyframes_and_of_the_log_stay() {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
@@ -346,7 +350,7 @@ fn a_state_of_an_older_version_whose_interval_is_nan_opens() {
 }
 
 #[test]
-fn what_is_no_checkpoint_is_an_error() {
+fn invalid_checkpoints_are_errors() {
     let mut evolution = evolution(3, &[2]);
     let keyframe = evolution.keyframe();
     let told = Told::from_fitness(evaluate(&evolution.ask().genotypes));

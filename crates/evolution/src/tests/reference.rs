@@ -64,27 +64,27 @@ fn assert_follows(fixture: &str, tolerance: f64) {
 }
 
 #[test]
-fn snes_is_that_of_its_paper() {
+fn snes_follows_its_paper() {
     assert_follows(include_str!("../../tests/fixtures/snes.json"), 1e-14);
 }
 
 #[test]
-fn xnes_is_that_of_its_paper() {
+fn xnes_follows_its_paper() {
     assert_follows(include_str!("../../tests/fixtures/xnes.json"), 1e-13);
 }
 
 #[test]
-fn openai_es_is_that_of_its_paper() {
+fn openai_es_follows_its_paper() {
     assert_follows(include_str!("../../tests/fixtures/openai_es.json"), 1e-13);
 }
 
 /// The package `cma` adds 1e-9 to the length by which it divides negative weights.
 #[test]
-fn cma_es_is_that_of_the_package_cma() {
+fn cma_es_follows_the_package_cma() {
     assert_follows(include_str!("../../tests/fixtures/cma_es.json"), 1e-8);
 }
 
 #[test]
-fn sep_cma_es_is_that_of_the_package_cmaes() {
+fn sep_cma_es_follows_the_package_cmaes() {
     assert_follows(include_str!("../../tests/fixtures/sep_cma_es.json"), 1e-12);
 }

@@ -123,7 +123,7 @@ fn every_generation_comes_back_from_every_keyframe_before_it() {
                     log: log[k..g].to_vec(),
                     n_flat: 0,
                 });
-                // Genotypes, champions, digests, and everything that follows from them.
+                // Compares genotypes, champions, digests, and everything that follows from them.
                 assert_eq!(restored.unwrap(), *state, "{variant:?} generation {g} from {k}");
             }
         }
@@ -143,7 +143,7 @@ fn an_individual_drawn_alone_has_the_bits_of_its_generation() {
             let distribution = Distribution::from_bytes(&bytes).unwrap();
             let generation = evolution.ask();
             assert_eq!(distribution.generation(), generation.index);
-            // In an arbitrary order.
+            // Draws in an arbitrary order.
             for i in (0..population_size).rev() {
                 let bits = |genes: &[f64]| genes.iter().map(|gene| gene.to_bits()).collect();
                 let (drawn, asked): (Vec<u64>, Vec<u64>) =
@@ -185,7 +185,7 @@ fn populations_draw_independently_and_meet_by_index() {
                 let parts = generation.samples.iter().map(|sample| sample.genotypes[i].clone());
                 assert_eq!(*genotype, parts.collect::<Vec<_>>().concat());
             }
-            // They may share only the centre individual of an odd OpenAI-ES population.
+            // Two populations may share only the centre individual of an odd OpenAI-ES population.
             assert_ne!(
                 generation.samples[0].genotypes, generation.samples[1].genotypes,
                 "{variant:?}"
@@ -311,7 +311,7 @@ fn long_runs_into_a_corner_and_on_a_plateau_stay_sound() {
     }
 }
 
-/// The bounds of the reader of experiment files.
+/// The domains are those of the reader of experiment files.
 #[test]
 fn parameters_at_the_ends_of_their_domains_stay_sound() {
     let (tiny, huge) = (1e-9, 1e9);
@@ -363,7 +363,7 @@ fn parameters_at_the_ends_of_their_domains_stay_sound() {
 }
 
 #[test]
-fn the_smallest_populations_that_are_let_in_evolve() {
+fn the_smallest_allowed_populations_evolve() {
     for variant in evolution_strategies() {
         let description = AlgorithmDescription::find(ALGORITHMS, variant.0).unwrap();
         let mut evolution = start(&variant, &[2, 1], description.individuals_min as usize);
@@ -464,8 +464,8 @@ fn the_bits_of_runs_are_fixed() {
         evolution.digest().to_string()[..16].to_owned()
     };
     let mut digests: Vec<String> = evolution_strategies().iter().map(digest).collect();
-    // Variants with operators of the first version only, and those with an operator of the
-    // second.
+    // First the variants with only operators of the first version, then those with an operator of
+    // the second.
     let mut operators = [Sha256::new(), Sha256::new()];
     for variant in genetic_algorithms(|_| true) {
         let is_second = variant.1.iter().any(|(_, value)| {

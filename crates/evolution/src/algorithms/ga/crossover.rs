@@ -28,7 +28,7 @@ pub enum Crossover {
 
 /// Number of cuts in multi-point crossover; fewer if there are fewer places.
 const N_CUTS: usize = 3;
-/// Distribution index of simulated binary crossover; a larger one keeps children closer to their
+/// Distribution index of simulated binary crossover. A larger index keeps children closer to their
 /// parents.
 const SBX_INDEX: f64 = 0.5;
 
@@ -81,7 +81,7 @@ fn blx_alpha(alpha: f64, a: &[f64], b: &[f64], rng: &mut Stream) -> Genotype {
     a.iter().zip(b).map(gene).collect()
 }
 
-/// Copies of the parents, with their genes swapped where `is_swapped` says so.
+/// Copies of the parents, with their genes swapped where `is_swapped` is true.
 fn swap_where(a: &[f64], b: &[f64], mut is_swapped: impl FnMut(usize) -> bool) -> [Genotype; 2] {
     let (mut x, mut y) = (a.to_vec(), b.to_vec());
     for j in 0..x.len() {

@@ -89,7 +89,7 @@ impl Described for Ga {
 
 impl Ga {
     /// The elite, then children, all with their parents. Each phase draws for all individuals
-    /// before the next one begins.
+    /// before the next phase begins.
     fn breed(&self, population_size: usize, rng: &mut Stream) -> Vec<(Genotype, Parents)> {
         let elite = self.ranked.iter().take(self.n_elite).enumerate();
         let mut population: Vec<(Genotype, Parents)> =
@@ -135,9 +135,9 @@ impl Strategy for Ga {
         self.d
     }
 
-    /// The first generation is U(0, 1)^d. Later ones: the elite unchanged, then children of
-    /// selected parents; a pair that does not cross, and an unpaired parent, are copied; every
-    /// child mutates and is clipped to \[0, 1\].
+    /// The first generation is U(0, 1)^d. Later generations have the elite unchanged, and then
+    /// children of selected parents. A pair that does not cross, and an unpaired parent, are
+    /// copied. Every child mutates, and is clipped to \[0, 1\].
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
         let drawn = self.draw(population_size, rng).into_iter();
         let genotypes = drawn.map(|(genes, _)| genes).collect();

@@ -106,7 +106,7 @@ mod tests {
         let mutations = [
             Mutation::Gaussian { sigma: 0.5 },
             Mutation::Uniform,
-            // An odd number, so that 0.5 is not a category, and every mutation changes a gene.
+            // With an odd number, 0.5 is no category, so every mutation changes the gene.
             Mutation::Categorical { categories: 7 },
         ];
         for mutation in mutations {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn flipped_bits_are_bits_and_two_flips_are_none() {
+    fn flipped_bits_are_bits_and_two_flips_restore_them() {
         let mut genes = [0.0, 1.0, 0.25];
         let mut rng = Stream::new(4, 0, 0, Purpose::Evolution, 0);
         Mutation::BitFlip.mutate(&mut genes, 1.0, &mut rng);
@@ -143,7 +143,7 @@ mod tests {
 
     /// Bounds 2 and 7 turn the categories into the whole numbers from 2 to 6, as in the original.
     #[test]
-    fn categories_are_equally_likely_and_the_upper_bound_is_none() {
+    fn categories_are_equally_likely_and_exclude_the_upper_bound() {
         let genes = mutated(Mutation::Categorical { categories: 5 }, 1.0);
         let mut counts = [0_i32; 5];
         for gene in &genes {

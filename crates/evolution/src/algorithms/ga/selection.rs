@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn stochastic_universal_draws_everyone_within_one_of_what_is_expected() {
+    fn stochastic_universal_draws_everyone_within_one_of_the_expectation() {
         let n = 37;
         let mut rng = rng();
         let mut offsets_matter = false;
@@ -228,12 +228,12 @@ mod tests {
         for selection in [Selection::Roulette, Selection::StochasticUniversal] {
             let shares = shares(selection, &[2.0, 0.0, -2.0]);
             assert!((shares[0] - 2.0 / 3.0).abs() < 0.004, "{shares:?}");
-            assert_eq!(shares[2], 0.0, "the worst has nothing left");
+            assert_eq!(shares[2], 0.0, "the worst has no share");
         }
     }
 
     #[test]
-    fn fitness_without_differences_or_beyond_reason_is_selected_from_all_the_same() {
+    fn parents_can_be_selected_by_equal_or_extreme_fitness() {
         for selection in [Selection::Roulette, Selection::StochasticUniversal] {
             for equal in [0.0, -3.0, 7.0, -0.0] {
                 assert_close(&shares(selection, &[equal; 4]), |_| 0.25);
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_without_a_share_is_ever_drawn() {
+    fn individuals_without_a_share_are_never_drawn() {
         let wheel = Wheel::new(vec![0.0, 1.0, 0.0, 2.0, 0.0]);
         let hits: Vec<usize> = [0.0, 0.1, 0.333, 0.334, 1.0].map(|p| wheel.at(p)).to_vec();
         assert_eq!(hits, [1, 1, 1, 3, 3]);

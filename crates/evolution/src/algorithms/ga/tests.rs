@@ -56,14 +56,14 @@ fn without_crossover_and_mutation_children_are_selected_parents() {
 }
 
 #[test]
-fn whoever_does_not_cross_still_mutates() {
+fn children_without_crossover_still_mutate() {
     let params = params(&[("crossover_prob", 0.0), ("mutation_prob", 1.0)]);
     let (first, second) = two_generations(&params, 21);
     assert!(second[3..].iter().all(|child| !first.contains(child)));
 }
 
 #[test]
-fn an_odd_parent_out_passes() {
+fn an_unpaired_parent_is_copied() {
     let params =
         params(&[("crossover_prob", 1.0), ("mutation_prob", 0.0)]).with("num_elite", 2_u32);
     let (first, second) = two_generations(&params, 21);
@@ -85,7 +85,7 @@ fn crossover_happens_with_its_probability() {
     let mut genes: Vec<u64> = first.genotypes.concat().iter().map(|gene| gene.to_bits()).collect();
     genes.sort_unstable();
     let children = ga.sample(n, &mut rng(1)).genotypes.concat();
-    // Children beyond the bounds are clipped to them: also new.
+    // Children that are clipped to the bounds are new, too.
     let passed =
         children.iter().filter(|child| genes.binary_search(&child.to_bits()).is_ok()).count();
     let share = passed as f64 / n as f64;
@@ -102,7 +102,7 @@ fn children_are_clipped_to_the_unit_cube() {
 }
 
 #[test]
-fn whoever_has_no_finite_fitness_is_neither_elite_nor_parent() {
+fn individuals_without_finite_fitness_are_neither_elite_nor_parents() {
     let params = params(&[("crossover_prob", 0.0), ("mutation_prob", 0.0)]);
     let mut ga = Ga::start(&params, 2);
     let first = ga.sample(6, &mut rng(0));
