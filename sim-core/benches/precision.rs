@@ -33,7 +33,8 @@ fn main() {
                 let mut stream = Stream::new(seed, 0, 0, Purpose::Evolution, 0);
                 let n_genes = simulation.genotype_len();
                 let genotype: Vec<f64> = (0..n_genes).map(|_| stream.uniform()).collect();
-                let fitness = simulation.evaluate(&genotype, seed, 0..1).expect("it is valid");
+                let fitness =
+                    simulation.evaluate(&genotype, seed, 0..1).expect("the genotype is valid");
                 (fitness[0], reference::run(&config, &genotype, seed, 0).fitness)
             })
             .collect();

@@ -28,7 +28,7 @@ use sim_core::{Isa, Simulation};
 
 use configs::{experiment_a, experiment_b, experiment_c, experiment_d, swarm_mut};
 
-/// Number of rounds, of which the median counts.
+/// Number of rounds; the result is their median.
 const N_ROUNDS: usize = 9;
 /// Approximate duration of one measurement.
 const MEASUREMENT: Duration = Duration::from_millis(100);
@@ -103,7 +103,8 @@ fn kernel(isas: &[Isa]) {
     }
 }
 
-/// Networks of spiking neurons, beside the rate neurons of the same task: random genotypes.
+/// Networks of spiking neurons and, for comparison, of rate neurons in the same task, with random
+/// genotypes.
 fn spiking(isas: &[Isa]) {
     println!("\nspiking: networks of experiment A, 50 lanes, us per lane and environment step");
     print!("{:10}", "");
@@ -131,7 +132,7 @@ fn spiking(isas: &[Isa]) {
     }
 }
 
-/// The same with all weights plastic.
+/// The same experiment with all weights plastic.
 fn plastic(config: &ExperimentConfig) -> ExperimentConfig {
     let mut config = config.clone();
     config.topology.learning = Some(LearningConfig {
@@ -147,7 +148,7 @@ fn plastic(config: &ExperimentConfig) -> ExperimentConfig {
     config
 }
 
-/// The same with Poisson nodes for each of the five inputs, three per value.
+/// The same experiment with Poisson nodes for each of the five inputs, three per value.
 fn encoded(config: &ExperimentConfig) -> ExperimentConfig {
     let mut config = config.clone();
     let field = GaussianField {
@@ -203,7 +204,7 @@ fn spiking_a(model: NeuronModel, synapses: SynapseModel) -> ExperimentConfig {
     config
 }
 
-/// The network in whole vectors of lanes, and in lanes that do not fill one.
+/// The network in whole vectors of lanes, and in numbers of lanes that do not fill a vector.
 fn lanes(isa: Isa) {
     println!("\nlanes ({isa}): network of experiment A, ns per substep");
     let config = experiment_a();
@@ -228,7 +229,7 @@ fn episodes(isa: Isa) {
     compare("A with LIF neurons", &spiking_a(NeuronModel::Lif, SynapseModel::Static), isa);
 }
 
-/// Swarms of different sizes and one density, beside ten robots.
+/// Swarms of different sizes and equal density, relative to ten robots.
 fn sizes(isa: Isa) {
     const SIZES: [u32; 6] = [10, 20, 50, 200, 1_000, 10_000];
     println!("\nsizes ({isa}), us/robot-step: robots that stand (A) and robots that move (D)");
@@ -249,8 +250,7 @@ fn sizes(isa: Isa) {
     }
 }
 
-/// The cost of a trial in an item with fewer than five trials, whose lanes fill vectors less
-/// well.
+/// The cost of a trial in an item with fewer than five trials, whose lanes do not fill the vectors.
 fn items(isa: Isa) {
     println!("\nitems ({isa}): time per trial, relative to that in an item of {N_TRIALS}");
     println!("{:20} {:>10} {:>10} {:>10} {:>10}", "trials of the item", 1, 2, 3, 4);
@@ -276,7 +276,7 @@ fn items(isa: Isa) {
     }
 }
 
-/// Fitness as a script, beside the same function in Rust.
+/// Fitness as a script, compared with the same function in Rust.
 fn scripts(isa: Isa) {
     println!("\nscripts ({isa}): whole episodes of experiment A, us per step of a trial");
     println!("{:20} {:>10} {:>10} {:>10}", "", "Rust", "script", "ratio");
@@ -364,7 +364,7 @@ impl Evaluations {
     }
 }
 
-/// The naive network of one robot in the naive world, whose own cost is negligible.
+/// The reference's network of one robot, in the reference's world, whose cost is negligible.
 fn reference_step(config: &ExperimentConfig, genotype: &[f64]) -> f64 {
     let mut short = config.clone();
     short.algorithm.evaluation_steps = REFERENCE_ROBOT_STEPS / n_robots(config);
@@ -384,7 +384,7 @@ fn seconds_per<T>(mut work: impl FnMut() -> T) -> f64 {
     start.elapsed().as_secs_f64() / f64::from(n)
 }
 
-/// The median of each measurement, taken in turns.
+/// The median of each measurement. The measurements take turns.
 fn medians<const N: usize>(mut measurements: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
     let mut samples = [const { Vec::new() }; N];
     for _ in 0..N_ROUNDS {

@@ -5,10 +5,11 @@
 //! cargo run --release -p sim-core --example champion_figure           # 200 runs of each task
 //! ```
 //!
-//! The tasks are a reduced quickstart, and a cheap fitness that is bounded and skewed, with a
-//! rare tail near 0. For each, it prints the mean error of the judgement and of the mean that
-//! selected the champion, with their standard errors, and how often the 95 % interval contains
-//! the value on fresh trials. docs/notebook/2026-11-algorithms.md has the results.
+//! The tasks are a reduced quickstart, and a cheap fitness that is bounded and skewed, with a rare
+//! tail near 0. For each task, the example prints the mean error of the judgement and of the mean
+//! that selected the champion, with their standard errors. It also prints how often the 95 %
+//! interval contains the value on fresh trials. docs/notebook/2026-11-algorithms.md has the
+//! results.
 
 use std::{
     env,
@@ -48,7 +49,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let segments = simulation.population_segments();
         let evolution = Evolution::new(&config, segments, sim_core::FINGERPRINT);
         run(evolution, |genotype, trial_set, trials| {
-            simulation.evaluate(genotype, trial_set, trials).expect("there is room for all")
+            simulation
+                .evaluate(genotype, trial_set, trials)
+                .expect("the world has room for all robots")
         })
     });
     report("skewed, with a rare tail", n_runs, |seed| {
@@ -81,8 +84,8 @@ struct Figures {
     n_selection_trials: u64,
 }
 
-/// A run from its first generation to its judgement, as in `coordinator/src/runs/round.rs`, and
-/// then its champion on fresh trials.
+/// Makes a run from its first generation to its judgement, as `coordinator/src/runs/round.rs` does,
+/// and then evaluates its champion on fresh trials.
 fn run(
     mut evolution: Evolution,
     evaluate: impl Fn(&[f64], TrialSet, Range<u32>) -> Vec<f64>,

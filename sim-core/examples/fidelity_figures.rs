@@ -6,9 +6,9 @@
 //! cargo run --release -p sim-core --example fidelity_figures -- evolve    # a quarter of an hour
 //! ```
 //!
-//! Each figure is the mean over 200 uniformly random genotypes, on the trials of generation 0.
-//! With `evolve`, it prints the results of SNES under the interpretations of Eq. 5.5 that no key
-//! of an experiment file selects. For the others, use `swarmctl run --set` and `swarmctl
+//! Each figure is the mean over 200 uniformly random genotypes, on the trials of generation 0. With
+//! `evolve`, the example prints the results of SNES under the interpretations of Eq. 5.5 that no
+//! key of an experiment file selects. For the others, use `swarmctl run --set` and `swarmctl
 //! compare`.
 
 use std::{env, error::Error, f64::consts::PI, fs};
@@ -83,8 +83,8 @@ fn read(name: &str) -> Result<String, Box<dyn Error>> {
     Ok(fs::read_to_string(format!("{}/../configs/{name}.json", env!("CARGO_MANIFEST_DIR")))?)
 }
 
-/// Replaces a text that occurs once in a file. The order of the keys, which is that of the genes,
-/// stays.
+/// Replaces a text that occurs once in a file. This keeps the order of the keys, which is the order
+/// of the genes.
 fn with(file: &str, from: &str, to: &str) -> Result<String, Box<dyn Error>> {
     match file.matches(from).count() {
         1 => Ok(file.replace(from, to)),
@@ -132,7 +132,7 @@ fn eq_5_5(
         let steps: Vec<f64> = trial[1..].chunks_exact(2).map(of_step).collect();
         mean(&steps)
     };
-    let values = values.expect("nothing stopped it");
+    let values = values.expect("nothing stopped the simulation");
     Ok(values.chunks(simulation.values_per_trial()).map(of_trial).collect())
 }
 

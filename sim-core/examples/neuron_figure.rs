@@ -18,21 +18,21 @@ use sim_core::Simulation;
 use sim_core::bench::NetworkLoad;
 
 const FIGURES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/figures");
-/// Substeps of the voltage over time; the current is on in some of them.
+/// Substeps of the plot of voltage over time. The current is on in some of them.
 const N_SUBSTEPS: usize = 500;
 const ON: std::ops::Range<usize> = 50..400;
-/// Currents of a curve, and the substeps in which spikes are counted.
+/// Number of currents of a curve, and of the substeps in which spikes are counted.
 const N_POINTS: usize = 160;
 const COUNTED: std::ops::Range<usize> = 500..2_500;
 
 /// The ranges of a model's figure.
 struct Subject {
     model: NeuronModel,
-    /// Current of the voltage over time.
+    /// Current in the plot of voltage over time.
     current: f64,
     /// Largest current of the curve.
     largest: f64,
-    /// Voltages at the bottom and the top, mV, and between ticks.
+    /// Voltage at the bottom, at the top, and between ticks, mV.
     voltages: [f64; 3],
 }
 

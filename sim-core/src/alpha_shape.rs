@@ -7,14 +7,14 @@ use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
 use crate::torus::Vec2;
 
-/// Coordinates below this count as zero, cm: the exact predicates cannot take the
+/// Coordinates below this count as zero, cm, because the exact predicates cannot compute with the
 /// tiniest numbers.
 const TINY: f64 = 1e-30;
 
 /// Whether each point lies on the outer border of the alpha shape, the union of the Delaunay
-/// triangles with a circumradius below `radius`. These are the points that the union does not
-/// surround. A point outside every such triangle is on the border, unless it lies in a hole.
-/// Points at the same place have the same result.
+/// triangles with a circumradius below `radius`. The border has the points that the union does not
+/// surround. A point outside every such triangle is on the border, unless it lies in a hole. Points
+/// at the same place have the same result.
 pub(crate) fn border(points: &[Vec2], radius: f64) -> Vec<bool> {
     let mut triangulation: DelaunayTriangulation<Point2<f64>> = DelaunayTriangulation::new();
     let coordinate = |x: f64| if x.abs() < TINY { 0.0 } else { x };
@@ -89,8 +89,8 @@ mod tests {
         Some((Vec2::new(a.x + x, a.y + y), x * x + y * y))
     }
 
-    /// The definition by brute force: the triples with an empty circumcircle make the
-    /// triangulation.
+    /// The definition by brute force: triples of points with an empty circumcircle are the
+    /// triangles.
     fn brute_force(points: &[Vec2], radius: f64) -> Vec<bool> {
         let n = points.len();
         let mut triangles = Vec::new();
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_beyond_the_radius_sticks_out() {
+    fn a_point_beyond_the_radius_is_on_the_border() {
         let tail = [
             (0.0, 0.0),
             (60.0, 0.0),
@@ -192,7 +192,7 @@ mod tests {
         // Two rings of twelve, the inner one around a hole of radius 100.
         let closed: Vec<_> = ring(12, 160.0).chain(ring(12, 100.0)).collect();
         assert_eq!(on_border(&closed), Vec::from_iter(0..12));
-        // Three robots less on either ring: the hole has become a bay.
+        // With three robots less on either ring, the hole becomes a bay.
         let open: Vec<_> = ring(9, 160.0).chain(ring(9, 100.0)).collect();
         assert_eq!(on_border(&open), Vec::from_iter(0..18));
     }
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn points_at_one_place_share_their_lot() {
+    fn points_at_one_place_have_the_same_result() {
         let square = [
             (0.0, 0.0),
             (60.0, 0.0),
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tiniest_coordinates_are_taken() {
+    fn the_tiniest_coordinates_are_accepted() {
         let square = [(1e-300, 0.0), (60.0, -1e-300), (60.0, 60.0), (0.0, 60.0), (31.0, 30.0)];
         assert_eq!(on_border(&square), [0, 1, 2, 3]);
     }

@@ -72,8 +72,8 @@ pub fn network_size(simulation: &Simulation) -> (usize, u32) {
     (network.synapses.iter().filter(is_recurrent).count(), network.n_substeps)
 }
 
-/// Runs `rounds` times 12 multiply-adds of f32 vectors at full speed, and returns the number of
-/// scalar ones.
+/// Runs 12 multiply-adds of f32 vectors, `rounds` times, at full speed. Returns the number of
+/// scalar multiply-adds.
 pub fn multiply_adds(isa: Isa, rounds: usize) -> usize {
     struct MultiplyAdds(Range<usize>);
     impl WithSimd for MultiplyAdds {

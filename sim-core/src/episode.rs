@@ -20,7 +20,7 @@ use experiment_file::RobotController;
 const MAX_LANES: usize = 256;
 
 /// Simulates one episode per trial, and shows each step to `recorder`. Calls `keep_going` before
-/// every step, and every few milliseconds of a script; returns false once that has returned
+/// every step, and every few milliseconds of a script. Returns false once `keep_going` has returned
 /// false.
 pub(crate) fn run(
     simulation: &Simulation,
@@ -36,7 +36,7 @@ pub(crate) fn run(
         match run_together(simulation, phenotype, trial_set, trials, first, keep_going, recorder) {
             Ok(true) => {}
             Ok(false) => return Ok(false),
-            // The error may come from the stop itself; a stopped episode has no result.
+            // The stop itself may have caused the error. A stopped episode has no result.
             Err(EvaluateError::Script { .. }) if !keep_going() => return Ok(false),
             Err(error) => return Err(error),
         }

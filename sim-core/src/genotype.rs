@@ -91,7 +91,7 @@ impl Codec {
                 }
             }
             if genes.len() == first {
-                // By chance, none of the named synapses exists.
+                // None of the named synapses exists, by chance.
                 let path = format!("algorithm.populations.{name}.objects");
                 problems.add(path, "nothing to evolve: none of these synapses exist");
             }
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_query_covers_is_named_and_fixed() {
+    fn parameters_that_no_query_covers_are_named_and_fixed() {
         let tau = GenotypeQuery::Neurons("tau", EnsembleSelector::Named("H1".into()));
         let mut config = with_queries(&[weights(SynapseSelector::Sensory), tau]);
         config.topology.synapses["H1-H2"].trainable = false;
@@ -309,7 +309,7 @@ mod tests {
             codec.uncovered()[0],
             format!("synapses:weights:H1-H1: {n} weights stay random")
         );
-        // No neuron evolves bias and gain, which is intentional; tau evolves in one of five
+        // Bias and gain evolve in no neuron, which is a choice. tau evolves in one of five
         // ensembles.
         assert_eq!(codec.uncovered().len(), 11 + 4);
         assert!(codec.uncovered().contains(&"neurons:tau:OUT_LED stays 2".to_owned()));

@@ -30,7 +30,7 @@ impl Leadership {
         self.leader.is_some()
     }
 
-    /// Forgets the leader: the next one's term starts anew.
+    /// Forgets the leader, so that the next term starts at 0.
     pub fn reset(&mut self) {
         self.leader = None;
     }
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn terms_count_consecutive_steps_of_one_and_the_same_robot() {
+    fn terms_count_consecutive_steps_of_the_same_robot() {
         let mut leadership = Leadership::default();
         let mut term = |leds: [u32; 3]| leadership.observe(&leds).map(|l| (l.robot, l.n_steps));
         assert_eq!(term([0, 0, 0]), None);

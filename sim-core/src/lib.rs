@@ -1,13 +1,13 @@
 //! The simulation of swarms of robots, as a pure function:
 //! (experiment, genotype, trial set, trials) -> fitness of each trial.
 //!
-//! No I/O, no threads, no clock, no ambient randomness, no platform libm: the
-//! same inputs give the same bits on every machine.
+//! The crate uses no I/O, threads, clock, ambient randomness or platform libm, so the same inputs
+//! give the same bits on every machine.
 //!
 //! # Example
 //!
-//! Five robots that turn light into the speed of their wheels, by a network whose
-//! weights are the genotype:
+//! Five robots turn light into the speed of their wheels, with a network whose weights are the
+//! genotype:
 //!
 //! ```
 //! use experiment_file::ExperimentConfig;
@@ -62,12 +62,12 @@
 //!
 //! [`Simulation::compile`] turns a configuration into a `network`, a codec of genotypes
 //! (`genotype`) and a `world` of `objects`. `episode` steps the trials of a genotype side by side
-//! and shows them to a recorder. In `stepping`, the caller decides the robots' actions. `trial`
-//! has the phases of a step, and `swarm` the state of the robots. Each phase is a module:
-//! `senses` and `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`,
-//! `fitness`. All of them use `determinism`'s random streams, `torus`, `neighbours` (robots
-//! within reach of each other), and the arithmetic on vectors of robots: `lanes` has the vectors,
-//! `exp2` the base of activation functions. `bench` opens the kernel to the benchmarks.
+//! and shows them to a recorder. In `stepping`, the caller decides the robots' actions. `trial` has
+//! the phases of a step, and `swarm` the state of the robots. Each phase is a module: `senses` and
+//! `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`, `fitness`. All
+//! modules use `determinism`'s random streams, `torus`, `neighbours` (robots within reach of each
+//! other), and the arithmetic on vectors of robots: `lanes` has the vectors, `exp2` the base of
+//! activation functions. `bench` opens the kernel to the benchmarks.
 
 mod alpha_shape;
 #[doc(hidden)]
@@ -116,8 +116,8 @@ pub use starts::{TRYING_TIME_MAX, Tried};
 pub use stepping::{Actions, Policy, StepError, Stepper};
 pub use torus::Vec2;
 
-/// Identifies the function that this crate computes. The version in it is the first release that
-/// computed this function, and stays in later releases, so that the digests of runs, which cover
-/// it, stay, too. Raise the format number whenever any fitness bit may change: coordinator and
-/// workers work together only if their fingerprints are equal.
+/// Identifies the function that this crate computes. Its version is that of the first release that
+/// computed this function. Later releases keep it, because the digests of runs cover it. Raise the
+/// format number whenever any fitness bit may change: coordinator and workers work together only if
+/// their fingerprints are equal.
 pub const FINGERPRINT: &str = "sim-core 0.1.0 format 3";

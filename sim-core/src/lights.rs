@@ -10,9 +10,9 @@ use experiment_file::{LightController, OrbitConfig, RandomTargetsConfig};
 const FLIP_PROBABILITY: f64 = 0.01;
 /// Time constant with which an orbit's radius approaches its final value, steps.
 const ORBIT_SETTLING: f64 = 50.0;
-/// Distance of a robot within which prey flees, cm.
+/// Distance within which prey flees from a robot, cm.
 const PREY_SIGHT: f64 = 150.0;
-/// Distance of a robot within which prey is caught, cm.
+/// Distance within which a robot catches prey, cm.
 const PREY_CATCH: f64 = 30.0;
 /// Distance that prey moves per step, cm.
 const PREY_SPEED: f64 = 3.0;
@@ -113,8 +113,8 @@ impl LightPath {
     }
 }
 
-/// The next position of prey: it flees from the robots that it sees, more strongly from near
-/// ones. It moves straight on while it sees none, and stops once it is caught.
+/// The next position of prey. The prey flees from the robots that it sees, more strongly from near
+/// robots. While it sees no robot, it moves straight on. Once it is caught, it stops.
 fn flee(
     position: Vec2,
     torus: &Torus,
@@ -187,7 +187,7 @@ mod tests {
         let mut path = orbit(OrbitConfig::default());
         let mut radius = 1.0;
         for step in 0..40 {
-            // The first flip of this stream comes later.
+            // The light turns back only after these steps.
             let position = path(step);
             radius += (200.0 - radius) / 50.0;
             let angle = 0.01 * f64::from(step + 1);
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn orbits_and_target_squares_have_the_size_that_is_asked_for() {
+    fn orbits_and_target_squares_have_the_configured_size() {
         let mut path_of_orbit = orbit(OrbitConfig { radius: 50.0, ..OrbitConfig::default() });
         let settled = (0..1000).map(&mut path_of_orbit).last().unwrap();
         assert!((TORUS.distance(settled, TORUS.center()) - 50.0).abs() < 1e-3);
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn prey_flees_from_what_it_sees_the_nearer_the_more() {
+    fn prey_flees_most_from_the_nearest_robots() {
         let at = |x: f64, y: f64| Vec2::new(START.x + x, START.y + y);
         let straight = 3.0 * libm::sqrt(0.5);
         assert_way(way_of_prey(&[at(150.0, 0.0)]), (straight, straight));
@@ -308,7 +308,7 @@ mod tests {
             LightPath::new(&LightController::LightPreyController {}, START, &TORUS, stream);
         let near = [Vec2::new(START.x + 29.0, START.y)];
         let position = path.advance(START, 0, &TORUS, &near);
-        assert!((TORUS.distance(START, position) - 3.0).abs() < 1e-9, "its last way");
+        assert!((TORUS.distance(START, position) - 3.0).abs() < 1e-9, "its last displacement");
         for step in 1..20 {
             assert_eq!(path.advance(position, step, &TORUS, &[]), position);
         }

@@ -1,5 +1,5 @@
-//! Finds robots that are near each other, with distances and directions. This depends only on
-//! positions, so it is recomputed only after a robot has moved.
+//! Finds robots that are near each other, with distances and directions. They depend only on
+//! positions, so they are recomputed only after a robot has moved.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -14,7 +14,8 @@ use determinism::Isa;
 const MAX_WITHOUT_GRID: usize = 64;
 /// Number of robots to process together, few enough for their scratch data to stay in the cache.
 const N_ROBOTS_AT_ONCE: usize = 128;
-/// Most cells per robot, because every step visits all cells, occupied or not.
+/// Most cells per robot. The number is limited because every step visits all cells, occupied or
+/// not.
 const MAX_CELLS_PER_ROBOT: usize = 16;
 /// Most cells per axis, to limit memory.
 const MAX_CELLS: usize = 512;
@@ -67,7 +68,7 @@ struct Found {
 }
 
 impl Neighbours {
-    /// Before the first [`update`](Self::update): no robot has a neighbour.
+    /// The state before the first [`update`](Self::update), in which no robot has a neighbour.
     pub fn new(reach: f64, n_robots: usize) -> Self {
         let first = vec![0; n_robots + 1];
         let found = Found { first, ..Found::default() };
@@ -111,7 +112,7 @@ impl Neighbours {
     /// Finds the neighbours of all robots.
     pub fn update(&mut self, torus: &Torus, positions: &[Vec2]) {
         if self.reach == 0.0 {
-            return; // no robot senses another one
+            return; // No robot senses another one.
         }
         let has_grid =
             positions.len() > MAX_WITHOUT_GRID && self.grid.sort(torus, self.reach, positions);
@@ -220,8 +221,8 @@ impl Near<'_> {
     /// Writes the near robots of a range after the `n_found` neighbours that are not located yet;
     /// returns the new number of these.
     ///
-    /// The outcome is unpredictable, so the code has no branch: it writes every robot, and the
-    /// next one overwrites a robot that is not near.
+    /// The outcome is unpredictable, so the code has no branch: it writes every robot, and then
+    /// overwrites a robot that is not near with the next robot.
     #[inline(always)]
     fn search(
         &self,
@@ -271,7 +272,7 @@ struct Placed {
 }
 
 impl Placed {
-    /// Resizes to `n` robots, with room to read the last ones in whole vectors.
+    /// Resizes to `n` robots, with room to read the last robots in whole vectors.
     fn resize(&mut self, n: usize) {
         self.robots.resize(n, 0);
         self.x.resize(n + N_AT_ONCE, 0.0);

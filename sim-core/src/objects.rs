@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::initializers::Positions;
 use crate::problems::Problems;
 
-/// The object to which instances belong, and their start.
+/// An object of the world, as the place of its instances.
 #[derive(Debug, Clone)]
 pub(crate) struct Site {
     /// Name of the object.
@@ -49,7 +49,7 @@ pub(crate) struct StaticObjects {
     pub by_script: bool,
 }
 
-/// Whether lights and ground areas are on: sensors do not see those that are off.
+/// Whether lights and ground areas are on. Sensors do not see objects that are off.
 #[derive(Debug, Clone)]
 pub(crate) struct Switches {
     /// Per light.

@@ -8,7 +8,7 @@ use crate::torus::Vec2;
 use determinism::Isa;
 
 /// Computes the polar coordinates of points (x, y), cm: `rho`, the distance from the origin, cm,
-/// and `bearing`, the direction from the origin, in \[0, 2 pi), which is 0 at the origin itself.
+/// and `bearing`, the direction from the origin, in \[0, 2 pi). The origin itself has bearing 0.
 /// All slices have the same length.
 pub(crate) fn complete(x: &[f64], y: &[f64], rho: &mut [f64], bearing: &mut [f64]) {
     Isa::best().run(Complete { x, y, rho, bearing });
@@ -24,8 +24,8 @@ struct Complete<'a> {
 impl WithSimd for Complete<'_> {
     type Output = ();
 
-    /// Without branches, the compiler computes several points at once. Blocks keep it from
-    /// computing the last points one by one.
+    /// Without branches, the compiler computes several points at once. Blocks keep the compiler
+    /// from computing the last points one by one.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         const N: usize = 16;
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_are_those_of_the_library() {
+    fn angles_agree_with_the_library() {
         for direction in directions() {
             for length in [1e-3, 1.0, 777.7] {
                 let (x, y) = (length * libm::cos(direction), length * libm::sin(direction));
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn many_at_once_are_as_one_by_one() {
+    fn many_points_at_once_give_the_bits_of_single_points() {
         for n in [0, 1, 15, 16, 17, 100] {
             let directions: Vec<f64> = directions().take(n).collect();
             let points = |f: fn(f64) -> f64| -> Vec<f64> {

@@ -12,9 +12,9 @@ use crate::torus::Vec2;
 /// Name of a measure.
 pub type MeasureName = Cow<'static, str>;
 
-/// Named measures of a task, beside its fitness; `docs/evaluation.md` lists them
-/// with their units. A measure that does not exist in a step (of distances to a
-/// light without lights, of robots with the LED on when there are none) is absent.
+/// Named measures of a task, beside its fitness; `docs/evaluation.md` lists them with their units.
+/// A measure is absent in a step in which it is undefined, such as the distance to a light in a
+/// world without lights.
 pub type Measures = IndexMap<MeasureName, f64>;
 
 /// The result of a watched episode.
@@ -63,9 +63,9 @@ pub struct RobotRecord {
     /// spiking neurons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub voltages: Vec<f64>,
-    /// The frame that it took from the air; `None` without one.
+    /// The frame that the robot took from the air; `None` if it took none.
     pub received: Option<ReceivedFrame>,
-    /// The message of that frame; zeros without one.
+    /// The message of that frame; zeros without a frame.
     pub received_message: Vec<f64>,
     /// Actions of the right and left wheel, in \[-1, 1\].
     pub wheels: [f64; 2],
@@ -76,10 +76,10 @@ pub struct RobotRecord {
     /// Its own message after quantisation, components in \[0, 1\]; on the air if `mode` is
     /// [`Mode::Send`].
     pub message: Vec<f64>,
-    /// Whether a script has put it out of order.
+    /// Whether a script has made it fail.
     #[serde(skip_serializing_if = "Not::not")]
     pub failed: bool,
-    /// Whether it carries something, as a script says.
+    /// Whether it carries something, as a script decides.
     #[serde(skip_serializing_if = "Not::not")]
     pub carries: bool,
     /// Whether its LED should be on; `None` if the task does not define it.

@@ -14,7 +14,7 @@ use experiment_file::SensorQuery;
 /// Readings of the robots of one group in one trial, except those of the radio.
 #[derive(Debug, Clone)]
 pub(crate) struct Senses {
-    /// As [`RobotGroup::sensors`].
+    /// In the order of [`RobotGroup::sensors`].
     sensors: Vec<SensorState>,
     /// The sources of noise.
     noise: Vec<NoiseSource>,
@@ -26,7 +26,7 @@ struct NoiseSource {
     key: NoiseStream,
     /// Per robot of the group.
     streams: Vec<Stream>,
-    /// Number of sensors that draw from them.
+    /// Number of sensors that draw from these streams.
     n_sensors: usize,
     /// Scratch: the drawn values.
     normals: Vec<f64>,
@@ -83,7 +83,7 @@ impl Senses {
         Self { sensors, noise }
     }
 
-    /// Writes one value of a reading, robot by robot. `robots`: the group's.
+    /// Writes one value of a reading, robot by robot. `robots`: the robots of the group.
     pub fn write(
         &self,
         query: SensorQuery,
@@ -256,7 +256,7 @@ mod tests {
     use determinism::random::Purpose;
 
     #[test]
-    fn noise_has_its_deviation_and_one_draw_per_value_that_is_wanted() {
+    fn noise_has_its_deviation_and_one_draw_per_wanted_value() {
         let stream = |robot| Stream::new(0, 0, 0, Purpose::SensorNoise, robot);
         let mut source = NoiseSource {
             key: NoiseStream::LIGHT_AND_DISTANCE,

@@ -18,7 +18,7 @@ use determinism::{Isa, random::TrialSet};
 use experiment_file::{ConfigError, ExperimentConfig, FitnessParams, limits};
 use task_script::ScriptError;
 
-/// Number of trials whose start positions are tried at compilation.
+/// Number of trials whose start positions the compilation tries.
 const N_TRIED_TRIALS: u32 = 8;
 
 /// A compiled experiment: (genotype, trial set, trials) -> fitness.
@@ -46,7 +46,7 @@ pub enum EvaluateError {
     GenotypeLength {
         /// Number of genes of the experiment's genotypes.
         expected: usize,
-        /// Number of genes of this one.
+        /// Number of genes of this genotype.
         actual: usize,
     },
     /// A gene outside \[0, 1\] or not finite: a bug of the caller.
@@ -114,7 +114,7 @@ impl Simulation {
         {
             problems.add(
                 script::PATH,
-                "has no function `fitness` or `final`, and `algorithm.fitness_function` names no other",
+                "has no function `fitness` or `final`, but `algorithm.fitness_function` names no other one",
             );
         }
         if let (Some(task), Some(script), Some(world)) = (&config.task, &script, &world) {
@@ -133,7 +133,7 @@ impl Simulation {
             measure_names,
             network,
             codec,
-            world: world.expect("a world without problems is one"),
+            world: world.expect("a world without problems compiles"),
         };
         let mut problems = Problems::default();
         for trial in 0..simulation.n_trials.min(N_TRIED_TRIALS) {
@@ -149,8 +149,8 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// The same experiment with other vector instructions than the processor's best. No bit of
-    /// any result changes.
+    /// The same experiment with other vector instructions than the processor's best. They change no
+    /// bit of any result.
     #[must_use]
     pub fn with_isa(self, isa: Isa) -> Self {
         Self { isa, ..self }
@@ -189,12 +189,12 @@ impl Simulation {
         trials: Range<u32>,
     ) -> Result<Vec<f64>, EvaluateError> {
         let fitness = self.evaluate_while(genotype, trial_set, trials, &|| true)?;
-        Ok(fitness.expect("nothing stopped it"))
+        Ok(fitness.expect("nothing stopped the simulation"))
     }
 
     /// As [`evaluate`](Self::evaluate), but calls `keep_going` before every environment step, and
-    /// every few milliseconds of a script; `None` if that returned false. So a clock or another
-    /// thread can end it, without deciding a bit of a result.
+    /// every few milliseconds of a script. Returns `None` once `keep_going` has returned false. So
+    /// a clock or another thread can stop an evaluation, but cannot change a bit of a result.
     ///
     /// # Errors
     ///
@@ -229,10 +229,10 @@ impl Simulation {
         1 + self.n_steps as usize * self.measure_names().len()
     }
 
-    /// As [`evaluate_while`](Self::evaluate_while), and measures every step. Returns
+    /// As [`evaluate_while`](Self::evaluate_while), but also measures every step. Returns
     /// [`values_per_trial`](Self::values_per_trial) numbers for each trial, one trial after the
-    /// other: its fitness, with the same bits, and then step by step the value of every measure
-    /// in [`measure_names`](Self::measure_names); NaN where a measure has no value.
+    /// other: its fitness, with the same bits, and then step by step the value of every measure in
+    /// [`measure_names`](Self::measure_names); NaN where a measure has no value.
     ///
     /// # Errors
     ///
@@ -267,11 +267,11 @@ impl Simulation {
         observe: &mut dyn FnMut(&StepRecord),
     ) -> Result<EpisodeSummary, EvaluateError> {
         let summary = self.simulate_while(genotype, trial_set, trial, &|| true, observe)?;
-        Ok(summary.expect("nothing stopped it"))
+        Ok(summary.expect("nothing stopped the simulation"))
     }
 
-    /// As [`simulate`](Self::simulate), but stops as [`evaluate_while`](Self::evaluate_while)
-    /// does; `None` if it was stopped.
+    /// As [`simulate`](Self::simulate), but stops as [`evaluate_while`](Self::evaluate_while) does,
+    /// and then returns `None`.
     ///
     /// # Errors
     ///
@@ -320,7 +320,7 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// If it has not.
+    /// If a gene is outside \[0, 1\], or if their number is not d.
     pub fn check_genotype(&self, genotype: &[f64]) -> Result<(), EvaluateError> {
         let (expected, actual) = (self.genotype_len(), genotype.len());
         if actual != expected {
@@ -333,7 +333,7 @@ impl Simulation {
     }
 }
 
-/// The measures of the function, and then those of the script with other names.
+/// The measures of the function, and then the measures of the script that have other names.
 fn measure_names(
     fitness: Option<&'static Definition>,
     script: Option<&ScriptTask>,

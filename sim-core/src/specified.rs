@@ -1,5 +1,5 @@
-//! Simulates an experiment from the text of its specification, as processes send it to each
-//! other: to numbers, or to a failure message.
+//! Simulates an experiment from the text of its specification, in which processes send it to each
+//! other. The result is numbers or a failure message.
 //!
 //! The simulation is deterministic, and so are its failures: every process that computes an item
 //! with this module returns the same message, to the byte.
@@ -47,7 +47,7 @@ impl SpecifiedSimulation {
     }
 
     /// Computes the trials of one genotype with [`Simulation::evaluate_while`] or
-    /// [`Simulation::measure_while`], as `output` says. `None` if `keep_going` stopped it.
+    /// [`Simulation::measure_while`], depending on `output`. `None` if `keep_going` stopped it.
     ///
     /// # Errors
     ///
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn failures_are_words() {
+    fn failures_are_messages() {
         let invalid = SpecifiedSimulation::compile("{}", Isa::best()).unwrap_err();
         let start = "the experiment's specification is not valid: ";
         assert!(invalid.starts_with(start), "{invalid}");

@@ -1,4 +1,4 @@
-//! Checks by trying whether the world can hold its objects, because sizes do not tell.
+//! Tries whether the world has room for its objects, which their sizes alone do not show.
 
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ const N_PAIRS_MAX: u64 = 50_000_000;
 /// warning, so no clock decides whether an experiment is accepted.
 pub const TRYING_TIME_MAX: Duration = Duration::from_secs(2);
 
-/// The extent of a trial of an experiment.
+/// The extent to which an experiment was tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[must_use]
 pub enum Tried {
@@ -39,8 +39,8 @@ impl Tried {
         match self {
             Self::All => None,
             Self::InPart => Some(
-                "its start takes long, so that not all of it was tried: a mistake of the script, or \
-                 a world too small for its objects, may only show when it runs",
+                "its start takes long, so only a part of it was tried: a mistake of the script, or \
+                 a world too small for its objects, may appear only during the run",
             ),
         }
     }
@@ -48,11 +48,11 @@ impl Tried {
 
 impl Simulation {
     /// Tries the start positions of a run's trials: those of the judgement at its end, then those
-    /// of its first generations, as long as that is quick. A trial in which an object finds no
-    /// place would end the run.
+    /// of its first generations, up to a limit of work. A trial in which an object finds no place
+    /// would end the run.
     ///
-    /// It also executes a script for the first steps of an episode, to find its mistakes before
-    /// the run. `goes_on` returns false to stop, for example by a clock; the result is then
+    /// This check also executes a script for the first steps of an episode, to find its mistakes
+    /// before the run. `goes_on` returns false to stop, for example by a clock; the result is then
     /// [`Tried::InPart`].
     ///
     /// # Errors
@@ -153,7 +153,8 @@ mod tests {
         let mut n_found = 0;
         for n_robots in 2..40 {
             let config = config(n_robots);
-            // The first trial of the first generation, in which there is a place for all.
+            // Compilation tries only the first trial of the first generation, which must have a
+            // place for all.
             let Ok(simulation) = Simulation::compile(&config) else { continue };
             let Err(error) = simulation.check_starts(&config.algorithm, &|| true) else { continue };
             n_found += 1;

@@ -16,8 +16,8 @@ use experiment_file::RobotController;
 /// network: it reads their stimuli and sets their actions. Robots with another controller decide
 /// for themselves.
 ///
-/// With the actions of [`decide`](Self::decide), fitness and everything else are those of
-/// [`Simulation::simulate`], bit for bit.
+/// With the actions of [`decide`](Self::decide), fitness and everything else have the same bits as
+/// in [`Simulation::simulate`].
 pub struct Stepper<'a> {
     simulation: &'a Simulation,
     trials: Vec<Trial<'a>>,
@@ -39,7 +39,7 @@ struct Group<'a> {
 }
 
 enum Decider<'a> {
-    /// The caller decides; `first_agent`: number of agents before this group in each trial.
+    /// The caller decides. `first_agent`: number of agents before this group in each trial.
     Caller { first_agent: usize },
     /// The robots decide for themselves.
     Own(Box<dyn Controller + 'a>),
@@ -53,7 +53,7 @@ pub struct Actions {
     pub wheels: Vec<[f64; 2]>,
     /// Colour of the LED, 0 off.
     pub leds: Vec<u32>,
-    /// Whether it sends its own message; otherwise it relays.
+    /// Whether the robot sends its own message; otherwise it relays.
     pub sends: Vec<bool>,
     /// Message, before quantisation, in \[0, 1\].
     pub messages: Vec<f64>,
@@ -69,7 +69,7 @@ pub struct Policy<'a> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StepError {
     /// An array has the wrong length.
-    #[error("{expected} {what} are needed, there are {actual}")]
+    #[error("expected {expected} {what}, found {actual}")]
     Length {
         /// The elements of the array.
         what: &'static str,
@@ -179,8 +179,8 @@ impl<'a> Stepper<'a> {
         self.step
     }
 
-    /// The stimuli of the agents, flattened, shape `[trial][agent][input]`; NaN for inputs that
-    /// an agent lacks. After the last step, those of the last step.
+    /// The stimuli of the agents, flattened, shape `[trial][agent][input]`; NaN for inputs that an
+    /// agent lacks. After the last step, these are still the stimuli of that step.
     pub fn stimuli(&self) -> Vec<f32> {
         let width = self.n_inputs();
         let mut values = Vec::with_capacity(self.trials.len() * self.n_agents * width);
@@ -192,9 +192,9 @@ impl<'a> Stepper<'a> {
         values
     }
 
-    /// Replaces the agents' stimuli in this step, which [`decide`](Self::decide) reads;
-    /// flattened, shape `[trial][agent][input]`. Radios still relay the frames that they heard.
-    /// Values of inputs that an agent lacks are ignored, and inhibited ones become zero.
+    /// Replaces the agents' stimuli in this step, which [`decide`](Self::decide) reads; flattened,
+    /// shape `[trial][agent][input]`. Radios still relay the frames that they heard. Values of
+    /// inputs that an agent lacks are ignored, and inhibited stimuli become zero.
     ///
     /// # Errors
     ///
@@ -242,14 +242,14 @@ impl<'a> Stepper<'a> {
     pub fn silence(&mut self, silent: &[bool]) -> Result<(), StepError> {
         let (expected, actual) = (self.silent.len(), silent.len());
         if expected != actual {
-            return Err(StepError::Length { what: "silent or not", expected, actual });
+            return Err(StepError::Length { what: "silence flags", expected, actual });
         }
         self.silent.copy_from_slice(silent);
         Ok(())
     }
 
     /// Whether agents sent their own message in the previous step, flattened, shape
-    /// `[trial][agent]`. This follows their actions, except in the first steps and under
+    /// `[trial][agent]`. The result follows their actions, except in the first steps and under
     /// perturbations.
     pub fn sent(&self) -> Vec<bool> {
         let agents = self.agents();
@@ -278,8 +278,8 @@ impl<'a> Stepper<'a> {
         Ok(Policy { controllers: controllers.collect() })
     }
 
-    /// The network's actions for the agents in this step. It draws random decisions from the
-    /// trials' streams, as in [`Simulation::simulate`], so call it once per step.
+    /// The network's actions for the agents in this step. This method draws random decisions from
+    /// the trials' streams, as [`Simulation::simulate`] does, so call it once per step.
     pub fn decide(&mut self, policy: &mut Policy<'_>) -> Actions {
         for (group, controller) in self.groups.iter().zip(&mut policy.controllers) {
             let Some(controller) = controller else { continue };
@@ -358,8 +358,8 @@ impl<'a> Stepper<'a> {
         Ok(fitness)
     }
 
-    /// Fitness of each trial so far: the mean over the steps that count, unless a script says
-    /// otherwise at the end.
+    /// Fitness of each trial so far: the mean over the steps that count, unless a script computes
+    /// another value at the end.
     pub fn fitness(&self) -> Vec<f64> {
         self.trials.iter().map(Trial::fitness).collect()
     }

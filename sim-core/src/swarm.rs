@@ -24,15 +24,15 @@ pub(crate) struct Swarm {
     pub messages: Vec<f64>,
     /// The frame that each robot took from the air in this step.
     pub received: Vec<Option<Received>>,
-    /// Messages of those frames, `[robot][component]`; zero without one.
+    /// Messages of those frames, `[robot][component]`; zero without a frame.
     pub received_messages: Vec<f64>,
     /// Components of a message.
     pub message_len: usize,
-    /// Whether the controller gets light readings.
+    /// Whether each robot's controller gets light readings.
     pub photosensitive: Vec<bool>,
-    /// Whether it has failed: it stands still, its LED is off, and no robot hears it.
+    /// Whether each robot has failed: it stands still, its LED is off, and no robot hears it.
     pub failed: Vec<bool>,
-    /// Whether it carries something.
+    /// Whether each robot carries something.
     pub carries: Vec<bool>,
     /// Whether any robot changed its place in this step.
     pub moved: bool,
@@ -51,8 +51,8 @@ pub(crate) struct Received {
     pub log_strength: f64,
     /// (cos, sin) of the receiving sector in the receiver's own frame of reference.
     pub receiving_direction: Vec2,
-    /// (cos, sin) of the sending sector in the frame of reference of the robot whose sector it
-    /// is; zero if it is not computed.
+    /// (cos, sin) of the sending sector, in its robot's own frame of reference; zero if not
+    /// computed.
     pub sending_direction: Vec2,
     /// Its origin, with the sending direction.
     pub origin: FrameOrigin,
@@ -122,7 +122,7 @@ impl Swarm {
         }
     }
 
-    /// The robot's action, reset to: stand, LED off, send zeros.
+    /// The robot's action, reset to standing still, LED off, sending zeros.
     pub fn fresh_action(&mut self, robot: usize) -> Action<'_> {
         let message = self.message_range(robot);
         let action = Action {

@@ -61,7 +61,7 @@ fn wrap(x: f64, period: f64) -> f64 {
     if (0.0..period).contains(&x) {
         return x;
     }
-    // Sums and differences of two angles; the same bits as below, but faster.
+    // A faster way for sums and differences of two angles, with the same bits.
     let rest = if (-period..0.0).contains(&x) {
         x + period
     } else if (period..2.0 * period).contains(&x) {
@@ -104,8 +104,8 @@ impl Torus {
         self.displacement(a, b).norm()
     }
 
-    /// Centre of mass of positions: the mean of the shortest displacements from the first one. It
-    /// equals the centre in the plane if the positions extend over less than half the world.
+    /// Centre of mass of positions: the mean of the shortest displacements from the first position.
+    /// It equals the centre in the plane if the positions extend over less than half the world.
     /// Returns the origin without positions.
     pub fn centroid(&self, positions: &[Vec2]) -> Vec2 {
         let Some(&first) = positions.first() else { return Vec2::default() };
@@ -118,12 +118,12 @@ impl Torus {
     }
 }
 
-/// The representative of `difference`, given in (-period, period), with the
-/// least absolute value.
+/// The equivalent of `difference` with the least absolute value. `difference`: in (-period,
+/// period).
 #[inline(always)]
 fn shortest(difference: f64, period: f64) -> f64 {
     let half = 0.5 * period;
-    // Without a branch, because positions are unpredictable.
+    // The code has no branch, because positions are unpredictable.
     let above = if difference > half { period } else { 0.0 };
     let below = if difference < -half { period } else { 0.0 };
     difference - above + below

@@ -180,8 +180,8 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// Start of a step: every robot senses, with present positions and headings and the frames on
-    /// the air. The script plans the actions of its robots.
+    /// Start of a step: every robot senses at its present position and heading, and hears the
+    /// frames on the air. The script plans the actions of its robots.
     pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
         let mut moved = mem::replace(&mut self.swarm.moved, false);
         let turned = mem::replace(&mut self.swarm.turned, false);
@@ -328,7 +328,7 @@ impl<'a> Trial<'a> {
         if self.run_script(step, ScriptRun::react)?.is_some()
             && self.radio.mute(self.world, &self.swarm.failed)
         {
-            // Other robots are the loudest now.
+            // Now other robots are the loudest, so hearing changes.
             self.swarm.turned = true;
         }
         Ok(())
@@ -339,7 +339,7 @@ impl<'a> Trial<'a> {
         let mut silent = self.swarm.failed.clone();
         robots.for_each(|robot| silent[robot] = true);
         if self.radio.mute(self.world, &silent) {
-            // Other robots are the loudest now.
+            // Now other robots are the loudest, so hearing changes.
             self.swarm.turned = true;
         }
     }

@@ -58,7 +58,7 @@ pub(crate) struct RobotGroup {
     pub readings: Vec<(SensorQuery, usize)>,
     /// Their sensors except the radio, in the order in which they draw noise.
     pub sensors: Vec<MountedSensor>,
-    /// Their wheels; `None`: they stand still.
+    /// Their wheels; `None` if they stand still.
     pub drive: Option<Drive>,
     /// Whether they have an LED.
     pub has_led: bool,
@@ -66,7 +66,7 @@ pub(crate) struct RobotGroup {
     pub quantiser: Option<Quantiser>,
     /// Number of steps at the start of an episode in which they always send.
     pub sending_steps: u32,
-    /// Whether each has a frame on the air before the first step.
+    /// Whether each robot has a frame on the air before the first step.
     pub initial_frame: bool,
     /// Their perturbations.
     pub perturbations: PerturbationsConfig,
@@ -134,7 +134,7 @@ impl World {
     /// The group of a robot.
     pub fn group_of(&self, robot: usize) -> usize {
         let group = self.groups.iter().position(|group| group.robots.contains(&robot));
-        group.expect("every robot is of a group")
+        group.expect("every robot belongs to a group")
     }
 
     /// The robots whose actions a script decides.

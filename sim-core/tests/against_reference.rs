@@ -20,9 +20,9 @@ use reference::Episode;
 /// The simulator's networks and quantisers compute in f32, the reference in f64, so activities
 /// differ by about 1e-7. Continuous values (headings, positions) then differ a little. A draw (of
 /// an LED, symbol or sector) or a comparison (with a range) differs only if a number falls into a
-/// gap of that width; from then on, trajectories differ. An episode makes the same draws in every
-/// run, and with few draws this is unlikely, so episodes of moving robots are short. Genotypes
-/// and positions avoid ties; tests of ties use exact angles.
+/// gap of that width; from then on, trajectories differ. With few draws, that is unlikely, so
+/// episodes of moving robots are short. Every run of a test makes the same draws. Genotypes and
+/// positions avoid ties; tests of ties use exact angles.
 const TOLERANCE: f64 = 1e-5;
 
 /// Asserts that simulator and reference give the same fitness in these trials,

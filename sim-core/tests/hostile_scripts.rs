@@ -134,7 +134,7 @@ const PIECES: [&str; 36] = [
     "\"",
 ];
 
-/// A text with some of its pieces gone, doubled, moved or replaced.
+/// A text with some of its pieces removed, doubled, moved or replaced.
 fn mutated(text: &str, stream: &mut Stream) -> String {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let mut pieces: Vec<String> = Vec::new();
@@ -144,7 +144,7 @@ fn mutated(text: &str, stream: &mut Stream) -> String {
             _ => pieces.push(c.to_string()),
         }
     }
-    // One word for another, which mostly stays a valid script.
+    // Replaces a word by another one, which mostly gives another valid script.
     let words: Vec<usize> =
         (0..pieces.len()).filter(|&at| pieces[at].starts_with(is_word)).collect();
     for _ in 0..=stream.below(2) {
@@ -154,7 +154,7 @@ fn mutated(text: &str, stream: &mut Stream) -> String {
             _ => PIECES[stream.below(N_VALUES)].to_owned(),
         };
     }
-    // Anything.
+    // In one of three texts, an arbitrary mutation follows.
     for _ in 0..stream.below(3).saturating_sub(1) {
         let at = stream.below(pieces.len());
         let other = stream.below(pieces.len());
@@ -187,7 +187,7 @@ fn damaged_scripts_are_refused_or_fail_with_their_place_or_compute_numbers() {
         }
     }
     trying.join().unwrap();
-    // Only if the system tells it.
+    // Not every system reports the peak memory.
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     if let Some(peak) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
         let peak: u64 = peak.trim().trim_end_matches(" kB").parse().unwrap();

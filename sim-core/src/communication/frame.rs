@@ -5,12 +5,12 @@ use crate::torus::Vec2;
 /// The origin of a frame's message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameOrigin {
-    /// The robot whose message it is.
+    /// The robot that sent the message first.
     pub originator: usize,
-    /// Number of emissions so far, from 1.
+    /// Number of emissions so far, at least 1.
     pub hops: u32,
-    /// Direction in which the originator sent it, in the originator's own frame of reference, as
-    /// the first relaying robot observed it; zero (none) on the first hop.
+    /// Direction in which the originator sent the message, in the originator's own frame of
+    /// reference. The first relaying robot observes it; on the first hop, it is zero (none).
     pub sending_direction: Vec2,
 }
 
@@ -64,7 +64,7 @@ impl Ether {
         &self.messages[emitter * self.message_len..][..self.message_len]
     }
 
-    /// Puts a robot's frame on the air, in place of its last one.
+    /// Puts a robot's frame on the air, in place of its previous frame.
     pub fn emit(&mut self, emitter: usize, origin: FrameOrigin, message: &[f64]) {
         self.origins[emitter] = origin;
         self.messages[emitter * self.message_len..][..self.message_len].copy_from_slice(message);

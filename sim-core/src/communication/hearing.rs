@@ -1,5 +1,5 @@
-//! Finds the strongest emitter in every sector of every robot. This depends only on positions and
-//! headings, so it is recomputed only after a robot has moved or turned.
+//! Finds the strongest emitter in every sector of every robot. The strongest emitters depend only
+//! on positions and headings, so they are recomputed only after a robot has moved or turned.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -26,7 +26,7 @@ pub(crate) struct Antenna {
 }
 
 impl Antenna {
-    /// Distance within which it is heard, cm; negative: nowhere.
+    /// Distance within which others hear the robot, cm; negative if it does not emit.
     pub fn reach(&self) -> f64 {
         self.emits_within.unwrap_or(-1.0)
     }
@@ -45,7 +45,7 @@ pub(crate) struct Receiver {
     pub max_hops: u32,
     /// The robot whose sector is the sending direction.
     pub sending_direction: SendingDirection,
-    /// Whether to compute sending directions, which only some networks get.
+    /// Whether to compute sending directions: only some networks get them.
     pub observes_sending_direction: bool,
 }
 
@@ -61,8 +61,8 @@ pub(crate) struct Heard {
     place: u32,
 }
 
-/// The strongest emitter in every sector of every robot. Every emitter puts a
-/// frame on the air in each step, so it is also the sector's frame.
+/// The strongest emitter in every sector of every robot. Every emitter puts a frame on the air in
+/// each step, so the strongest emitter gives the frame of the sector.
 #[derive(Debug, Clone)]
 pub(crate) struct Hearing {
     /// Groups of robots with receivers.
@@ -123,7 +123,7 @@ impl Loudest {
 }
 
 impl Hearing {
-    /// Before the first [`update`](Self::update): no robot hears another one.
+    /// The state before the first [`update`](Self::update), in which no robot hears another.
     pub fn new(antennas: &[Antenna]) -> Self {
         let nobody = Heard { robot: antennas.len() as u32, place: 0 };
         let mut listeners = Vec::new();
@@ -144,7 +144,7 @@ impl Hearing {
         &self.listeners
     }
 
-    /// Sets the distances within which robots are heard, cm; negative: not at all.
+    /// Sets the distance within which each robot is heard, cm; negative if it is not heard.
     pub fn set_reaches(&mut self, reaches: impl Iterator<Item = f64>) {
         self.reaches.clear();
         self.reaches.extend(reaches);
@@ -407,7 +407,7 @@ mod tests {
             let mut robots =
                 kinds.flat_map(|kind| kind.iter().map(move |listening| (kind, listening)));
             let found = robots.find(|(_, (listener, _))| *listener == robot);
-            found.map(|(kind, (_, heard))| (kind, heard)).expect("it listens")
+            found.map(|(kind, (_, heard))| (kind, heard)).expect("the robot listens")
         }
 
         /// The emitters that a robot hears, sector by sector.
@@ -428,7 +428,7 @@ mod tests {
 
     #[test]
     fn strength_and_directions_match_a_case_by_hand() {
-        // 50 cm away, 53.13 degrees to the left; the other robot looks up.
+        // The other robot is 50 cm away, 53.13 degrees to the left, and looks up.
         let robots = [(990.0, 500.0, 0.0), (20.0, 540.0, FRAC_PI_2)];
         let scene = scene(&[ANTENNA; 2], &robots);
         assert_eq!(scene.emitters(0), [None, Some(1), None, None]);
@@ -481,7 +481,7 @@ mod tests {
     }
 
     #[test]
-    fn ears_and_voices_are_independent() {
+    fn receivers_and_transmitters_are_independent() {
         let beacon = Antenna { receiver: None, ..ANTENNA };
         let listener = Antenna { emits_within: None, ..ANTENNA };
         let robots = [(500.0, 500.0, 0.0), (550.0, 500.0, 0.0), (510.0, 500.0, 0.0)];

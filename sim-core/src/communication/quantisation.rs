@@ -7,9 +7,9 @@ use pulp::{Simd, WithSimd};
 use crate::exp2::exp2;
 use determinism::Isa;
 
-/// Draws lattice points with probabilities softmax(-beta * d / sqrt(M)), d the
-/// Euclidean distance to the message. In f32, as the messages are, one lane per
-/// robot: probabilities are accurate to about 1e-5.
+/// Draws lattice points with probabilities softmax(-beta * d / sqrt(M)), d the Euclidean distance
+/// to the message. Computes in f32, with one lane per robot, so probabilities are accurate to about
+/// 1e-5.
 #[derive(Debug, Clone)]
 pub(crate) struct Quantiser {
     /// A point's weight is 2^(slope * distance), up to a common factor.
@@ -27,7 +27,7 @@ impl Quantiser {
     /// The lattice of messages of length M = `message_len` with K = `n_levels` >= 2 levels
     /// i/(K-1) per component.
     pub fn new(message_len: usize, n_levels: usize, beta: f64) -> Self {
-        debug_assert!(n_levels >= 2, "one level says nothing");
+        debug_assert!(n_levels >= 2, "a single level carries no information");
         let n_points = (0..message_len).fold(1, |n, _| n * n_levels);
         let mut points = vec![0.0; n_points * message_len];
         for (index, point) in points.chunks_exact_mut(message_len).enumerate() {
@@ -98,7 +98,7 @@ impl WithSimd for Quantise<'_> {
             *weight = exp2(simd, simd.mul_f32s(slope, simd.sub_f32s(*weight, nearest)));
             total = simd.add_f32s(total, *weight);
         }
-        // The symbol is the number of points whose cumulative weight u passes.
+        // The symbol is the number of points with a cumulative weight of at most u.
         let target = simd.mul_f32s(u, total);
         let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
         let (mut sum, mut n_passed) = (zero, zero);
@@ -110,7 +110,7 @@ impl WithSimd for Quantise<'_> {
         weights[0] = n_passed;
         let symbols = &memory[(n_components + 1) * S::F32_LANES..];
         for (message, &symbol) in messages.chunks_exact_mut(n_components).zip(symbols) {
-            // By rounding, u may pass all of them.
+            // Because of rounding, the count may include all points.
             let symbol = (symbol as usize).min(n_points - 1);
             let point = &quantiser.points[symbol * n_components..][..n_components];
             message.copy_from_slice(point);
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn probabilities_match_a_case_by_hand() {
-        // Two points, at distances 0.25 and 0.75 of a message of one component.
+        // Two points, at distances 0.25 and 0.75 from a message of one component.
         let quantiser = Quantiser::new(1, 2, 2.0);
         let p_near = 1.0 / (1.0 + libm::exp(-1.0));
         for (u, level) in [(p_near - 1e-6, 0.0), (p_near + 1e-6, 1.0)] {

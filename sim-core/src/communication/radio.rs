@@ -18,7 +18,7 @@ use experiment_file::SendingDirection;
 pub(crate) struct Radio {
     ether: Ether,
     hearing: Hearing,
-    /// Whether each robot is not heard.
+    /// Whether each robot is muted.
     silent: Vec<bool>,
     /// Streams for the choice among valid frames, per robot.
     reception: Vec<Stream>,
@@ -27,7 +27,7 @@ pub(crate) struct Radio {
     /// The draws of a group's quantiser.
     u: Vec<f64>,
     scratch: Scratch,
-    /// The sectors of a robot whose strongest frame is valid.
+    /// Scratch: the sectors of a robot whose strongest frame is valid.
     valid: Vec<usize>,
 }
 
@@ -103,7 +103,8 @@ impl Radio {
                 } else {
                     Vec2::default()
                 };
-                // The first to hear a frame sees the direction in which its message was sent.
+                // The first robot to hear a frame observes the direction in which its message was
+                // sent.
                 let mut origin = ether.origin(emitter);
                 if origin.hops == 1 {
                     origin.sending_direction = sending_direction;

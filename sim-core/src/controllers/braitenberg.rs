@@ -9,8 +9,8 @@ use determinism::random::Stream;
 const GAIN: f32 = 5.0;
 
 /// a_r = clip(5 * mean of sectors 1..=n/2), a_l = clip(5 * mean of sectors n-n/2..n), with n/2
-/// rounded down: sector 0 looks ahead and belongs to no half; with an even number, the sector
-/// that looks back belongs to both.
+/// rounded down. Sector 0 looks ahead and belongs to no half. If n is even, the sector that looks
+/// back belongs to both halves.
 #[derive(Debug)]
 pub(crate) struct BraitenbergLightFollower {
     n_sectors: usize,

@@ -33,7 +33,7 @@ pub(crate) trait Controller {
     }
 }
 
-/// Leaves all decisions to the script, whose plans the trial has.
+/// Decides nothing, because the script plans the actions.
 pub(crate) struct Scripted;
 
 impl Controller for Scripted {

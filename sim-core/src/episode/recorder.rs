@@ -9,8 +9,8 @@ use crate::trial::Trial;
 
 /// Sees every step of a number of episodes, numbered from 0.
 pub(crate) trait Recorder {
-    /// Called after environment step `step` of an episode, before its lights move. `fitness`: of
-    /// the step; `None` if it does not count.
+    /// Called after environment step `step` of an episode, before its lights move. `fitness`: the
+    /// fitness of the step; `None` if the step does not count.
     fn step(
         &mut self,
         episode: usize,
@@ -95,7 +95,7 @@ impl Recorder for AllMeasures<'_> {
 /// Shows every step of one episode to a function.
 pub(crate) struct Viewer<'a> {
     observe: &'a mut dyn FnMut(&StepRecord),
-    /// The latest step. Every step refills it, because its lists keep their lengths.
+    /// The latest step. Every step refills this record, because its lists keep their lengths.
     record: StepRecord,
     /// The sum of each measure, and the number of its steps.
     sums: IndexMap<MeasureName, (f64, u32)>,

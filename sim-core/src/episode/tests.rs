@@ -30,7 +30,7 @@ fn watch(config: &ExperimentConfig, seed: u64, trial: u32) -> (Vec<StepRecord>, 
     (steps, summary)
 }
 
-/// Inputs that carry a reading.
+/// The inputs that carry a reading.
 fn inputs(config: &ExperimentConfig, sensor: SensorQuery) -> std::ops::Range<usize> {
     let mut first = 0;
     for stimulus in config.topology.stimuli.values() {
@@ -57,7 +57,7 @@ fn add_stimulus(config: &mut ExperimentConfig, name: &str, n: u32, sensor: Senso
 }
 
 #[test]
-fn watching_and_company_change_no_bit() {
+fn watching_and_other_trials_change_no_bit() {
     for (mut config, seed) in experiments().into_iter().zip(0..) {
         config.algorithm.evaluation_steps = 150;
         let simulation = Simulation::compile(&config).unwrap();
@@ -73,7 +73,7 @@ fn watching_and_company_change_no_bit() {
 }
 
 #[test]
-fn many_trials_are_as_many_fitnesses_in_order() {
+fn every_trial_has_its_fitness_in_order() {
     let mut config = experiment_a();
     (config.algorithm.evaluation_steps, config.algorithm.num_evaluations) = (30, 60);
     let simulation = Simulation::compile(&config).unwrap();
@@ -168,7 +168,7 @@ fn messages_are_symbols_and_frames_obey_the_protocol() {
                 assert!((1..10).contains(&received.hops));
                 assert!(received.sector < 4 && received.signal > 0.0);
                 n_relayed += usize::from(received.hops > 1);
-                // It was sent this many steps ago.
+                // The message was sent `hops` steps ago.
                 let sent = &steps[k - received.hops as usize].robots[received.originator];
                 assert_eq!(sent.mode, Mode::Send);
                 let heard = sent.message.iter().map(|&level| f64::from(level as f32));
@@ -180,7 +180,7 @@ fn messages_are_symbols_and_frames_obey_the_protocol() {
 }
 
 #[test]
-fn a_leader_whose_time_is_up_falls_silent() {
+fn a_leader_fails_and_relays_after_its_time() {
     const N: usize = 3;
     let mut config = experiment_a();
     robot(&mut config).num_instances = N as u32;
@@ -230,7 +230,7 @@ fn inhibited_light_is_exactly_zero_for_eight_of_ten() {
 }
 
 #[test]
-fn a_deaf_network_sits_on_a_radio_that_works() {
+fn the_radio_of_a_deaf_network_still_receives() {
     let mut config = experiment_a();
     let receiver = WholeReceiver::WirelessReceiver;
     robot(&mut config).perturbations.stimuli_inhibition = vec![StimuliInhibitionConfig {
@@ -385,7 +385,7 @@ fn objects_share_one_ether_but_one_of_them_is_evaluated() {
 }
 
 #[test]
-fn lights_count_where_they_were_during_the_step() {
+fn fitness_uses_the_positions_of_lights_during_the_step() {
     let (steps, _) = watch(&experiment_d(), 0, 0);
     let center = Vec2::new(500.0, 500.0);
     assert!(TORUS.distance(steps[0].lights[0], center) < 1.0 + 1e-9, "not moved yet");
@@ -393,7 +393,7 @@ fn lights_count_where_they_were_during_the_step() {
 }
 
 #[test]
-fn a_swarm_of_one_hears_nobody() {
+fn a_single_robot_hears_no_frame() {
     for mut config in experiments() {
         let robot = robot(&mut config);
         robot.num_instances = 1;

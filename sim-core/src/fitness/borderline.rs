@@ -25,7 +25,7 @@ pub(super) struct IdentifyBorderline {
 }
 
 impl IdentifyBorderline {
-    /// Robots less than `range` apart are connected; `alpha` of their alpha shape.
+    /// Robots less than `range` apart are connected. `alpha`: the parameter of their alpha shape.
     pub fn new(range: f64, alpha: f64) -> Self {
         Self { range, alpha, targets: Vec::new() }
     }
@@ -64,14 +64,15 @@ struct Rates {
     true_negative: f64,
     /// Share of robots with the LED on that are at the border; `None` if no LED is on.
     precision: Option<f64>,
-    /// Share of all robots that are right.
+    /// Share of all robots with the right LED.
     accuracy: f64,
 }
 
 impl Rates {
     /// Compares LEDs with the robots' places.
     fn new(at_border: &[bool], leds: &[u32]) -> Self {
-        // Number of robots at the place with the right LED, and of all robots at the place.
+        // Returns the number of robots at this place with the right LED, and of all robots at this
+        // place.
         let count = |place: bool| {
             let robots = at_border.iter().zip(leds).filter(|(at_border, _)| **at_border == place);
             let right = robots.clone().filter(|(_, led)| (**led > 0) == place).count();
@@ -136,7 +137,7 @@ mod tests {
         away[4] = Vec2::new(500.0, 500.0);
         moment.positions = &away;
         moment.moved = false;
-        assert_eq!(fitness.step(&moment), Some(1.0), "said not to have moved");
+        assert_eq!(fitness.step(&moment), Some(1.0), "the moment states that no robot moved");
         moment.moved = true;
         assert_eq!(fitness.step(&moment), Some(0.8));
     }
@@ -156,7 +157,8 @@ mod tests {
 
     proptest! {
         /// Accuracy is the mean of both rates, weighted with the numbers of robots at each place.
-        /// The right LEDs among those that are on are the same robots as those among the border.
+        /// The robots at the border with their LED on are counted alike by precision and by the
+        /// true positive rate.
         #[test]
         fn rates_agree_with_each_other(robots in prop::collection::vec((any::<bool>(), 0..3_u32), 1..40)) {
             let (at_border, leds): (Vec<bool>, Vec<u32>) = robots.into_iter().unzip();

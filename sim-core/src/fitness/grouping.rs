@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn nearness_to_the_centroid_counts() {
         assert!((fitness(&[(980.0, 0.0), (20.0, 0.0)]) - 0.8).abs() < 1e-12);
-        // Centroid at x = 60: distances 60, 10, 50, of the last 120.
+        // The centroid is at x = 60, and the distances are 60, 10, 50 and 120.
         let far = fitness(&[(0.0, 0.0), (50.0, 0.0), (10.0, 0.0), (180.0, 0.0)]);
         assert_eq!(far, 0.0, "10 cm apart");
         let spread = fitness(&[(0.0, 0.0), (50.0, 0.0), (25.0, 0.0), (165.0, 0.0)]);

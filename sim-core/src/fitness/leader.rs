@@ -1,4 +1,4 @@
-//! `identify_leader` (Eq. 5.2 and 5.3): one robot, and the same one, leads.
+//! `identify_leader` (Eq. 5.2 and 5.3): exactly one robot leads, and always the same.
 
 use super::{Definition, Fitness, Moment};
 use crate::leadership::Leadership;
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn one_leader_is_told_from_none_and_several() {
+    fn measures_distinguish_one_leader_from_none_and_several() {
         let mut fitness = IdentifyLeader::default();
         for (leds, n, expected) in
             [([0, 0], 0.0, 0.0), ([0, 1], 1.0, 1.0), ([2, 0], 1.0, 1.0), ([1, 1], 2.0, 0.0)]

@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_are_those_of_photosensitive_and_other_robots() {
+    fn photosensitive_and_other_robots_have_separate_measures() {
         let positions = [Vec2::new(0.0, 0.0), Vec2::new(30.0, 0.0), Vec2::new(60.0, 0.0)];
         let moment = Moment {
             positions: &positions,

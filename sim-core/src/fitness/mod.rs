@@ -15,8 +15,8 @@ use crate::torus::{Torus, Vec2};
 use crate::world::World;
 use experiment_file::{FitnessFunction, FitnessParams};
 
-/// The view of a fitness function on a step: the evaluated robots, with their actions and after
-/// their motion, and the lights before their motion.
+/// The data of a step for a fitness function: the evaluated robots after their motion, their
+/// actions, and the lights before their motion.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moment<'a> {
     /// The plane.
@@ -40,7 +40,7 @@ pub(crate) struct Moment<'a> {
 }
 
 impl<'a> Moment<'a> {
-    /// This step of a trial.
+    /// The moment of a step.
     pub fn new(world: &'a World, swarm: &'a Swarm, lights: &'a [Vec2], step: u32) -> Self {
         let evaluated = world.evaluated();
         Self {
@@ -116,7 +116,7 @@ fn measures(fitness: &mut dyn Fitness, moment: &Moment<'_>) -> Vec<(&'static str
     fitness.measure(moment, &mut measures);
     let name = |name| match name {
         Cow::Borrowed(name) => name,
-        Cow::Owned(name) => unreachable!("{name} is no literal"),
+        Cow::Owned(name) => unreachable!("the name {name} is no literal"),
     };
     measures.into_iter().map(|(measure, value)| (name(measure), value)).collect()
 }

@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_is_that_of_a_circle() {
+    fn the_mean_heading_is_circular() {
         // Around 0 = 2 pi.
         assert!((misalignment(&[0.1, TAU - 0.1]) - 0.1).abs() < 1e-12);
         assert!((misalignment(&[3.0, 3.0, 3.3]) - 0.4 / 3.0).abs() < 1e-3);

@@ -16,8 +16,8 @@ const DELAYS: u64 = 1 << 32;
 /// Number of possible delays.
 const N_DELAYS: usize = (*limits::DELAYS.end() - *limits::DELAYS.start()) as usize + 1;
 
-/// Default values of all parameters. All weights of a decoder and all delays are drawn, so that
-/// no value depends on which others are covered.
+/// Default values of all parameters. Draws all weights of a decoder and all delays, covered or not,
+/// so that no value depends on the queries.
 pub(super) fn defaults(
     config: &TopologyConfig,
     network: &Network,
@@ -115,8 +115,8 @@ impl ParameterCoverage {
         }
     }
 
-    /// Describes the parameters that are not covered. Omits those that the experiment declares
-    /// untrainable, and those that it evolves in no neuron, which is a choice.
+    /// Describes the parameters that are not covered. Omits parameters that the experiment declares
+    /// untrainable, and parameters that evolve in no neuron, which is a choice.
     pub fn describe(&self, config: &TopologyConfig, network: &Network) -> Vec<String> {
         let mut lines = Vec::new();
         for (name, group) in network.groups.iter().filter(|(_, group)| group.trainable) {

@@ -1,5 +1,5 @@
-//! `random_graph`: a connected, compact random geometric graph, grown one robot at a time. Far
-//! from the centre, steps turn tangential and are pulled back.
+//! `random_graph`: a connected, compact random geometric graph, grown one robot at a time. Far from
+//! the centre, steps become tangential and lead back.
 
 use super::Unplaceable;
 use crate::torus::{Torus, Vec2};

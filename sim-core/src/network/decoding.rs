@@ -86,7 +86,7 @@ pub(super) fn compile(
 }
 
 impl Output {
-    /// Decodes the neurons of one lane. `weights`: of the decoder, value by value.
+    /// Decodes the neurons of one lane. `weights`: the weights of the decoder, value by value.
     pub fn decode(
         &self,
         state: &NetworkState,
@@ -227,7 +227,8 @@ impl Output {
 }
 
 impl Decoder {
-    /// The value of one activity; not for categories, which depend on all activities.
+    /// The value of one activity. Categories depend on all activities, so this does not decode
+    /// them.
     fn value(self, activity: f64, stream: &mut Stream) -> f64 {
         match self {
             Self::Threshold => f64::from(activity >= 0.5),

@@ -6,9 +6,9 @@ use super::connections::Source;
 use super::{Network, Phenotype};
 
 impl Network {
-    /// Stimuli, neurons and synapses with their values. Inputs, neurons and nodes of encoders
-    /// are numbered each from 0 in the order of the experiment file. A neuron has a key
-    /// for every parameter of the neuron model.
+    /// Stimuli, neurons and synapses with their values. Inputs, neurons and nodes of encoders each
+    /// have numbers from 0, in the order of the experiment file. A neuron has a key for every
+    /// parameter of the neuron model.
     pub fn to_json(&self, phenotype: &Phenotype) -> Value {
         let n_neurons = self.n_neurons();
         let mut weights_of_fields = phenotype.encoders.iter();
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn encoders_have_their_nodes_from_which_synapses_start() {
+    fn synapses_start_from_the_nodes_of_encoders() {
         let network =
             network(include_str!("../../../configs/spiking/light_follower_lif_encoded.json"));
         let stimuli = network["stimuli"].as_array().unwrap();

@@ -34,9 +34,9 @@ pub(crate) struct Network {
     pub bias_in_gain: bool,
     /// Activities before the first substep.
     pub initial_rates: InitialRates,
-    /// Time constant of motor neurons, seconds; `None`: as for all neurons.
+    /// Fixed time constant of motor neurons, seconds; `None` if they have none.
     pub motor_tau: Option<f64>,
-    /// Receptors of dynamic synapses; `None` for static ones.
+    /// Receptors of dynamic synapses; `None` for static synapses.
     pub receptors: Option<SynapseParams>,
     /// The plasticity of weights; `None`: weights are constant.
     pub learning: Option<LearningConfig>,
@@ -62,7 +62,7 @@ pub(crate) struct Stimulus {
     pub inputs: Range<usize>,
     /// The reading that it carries.
     pub sensor: SensorQuery,
-    /// Its encoder; `None`: it acts without one.
+    /// Its encoder; `None` if it has none.
     pub encoder: Option<Encoder>,
 }
 

@@ -10,15 +10,14 @@ pub(crate) struct Phenotype {
     pub weights: Vec<f64>,
     /// Values by number of the neuron, for each parameter of the neuron model, in its order.
     pub neurons: IndexMap<&'static str, Vec<f64>>,
-    /// By number of the neuron, and then of the node of an encoder: the delay of its dynamic
-    /// synapses, whole substeps within
-    /// [`limits::DELAYS`](experiment_file::limits::DELAYS). Empty with static synapses.
+    /// Delays of dynamic synapses, by number of the neuron, and then of the node of an encoder;
+    /// whole substeps within [`limits::DELAYS`](experiment_file::limits::DELAYS). Empty with static
+    /// synapses.
     pub delays: Vec<f64>,
-    /// By number of the encoder: the weights of its receptive field, node by node.
+    /// Weights of receptive fields, by number of the encoder, then node by node.
     pub encoders: Vec<Vec<f64>>,
-    /// By number of the group of synapses: A, B, C and D, by which its weights change if it is
-    /// plastic.
+    /// Coefficients of plasticity, A, B, C and D, by number of the group of synapses.
     pub learning: Vec<[f64; 4]>,
-    /// By number of the output: the weights of its decoding, value by value.
+    /// Weights of decodings, by number of the output, then value by value.
     pub decoders: Vec<Vec<f64>>,
 }

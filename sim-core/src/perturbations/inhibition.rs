@@ -1,11 +1,11 @@
-//! `stimuli_inhibition`: the networks of some robots lose a stimulus. Their
-//! sensors and radios work on, so they still relay what they receive.
+//! `stimuli_inhibition`: the networks of some robots lose a stimulus. Their sensors and radios
+//! still work, so these robots still relay received frames.
 
 use super::draw_affected;
 use determinism::random::Stream;
 use experiment_file::{InhibitedStimulus, SensorQuery, StimuliInhibitionConfig};
 
-/// Who lost what.
+/// The affected robots, and the stimulus that they lose.
 #[derive(Debug, Clone)]
 pub(super) struct Inhibition {
     stimulus: InhibitedStimulus,

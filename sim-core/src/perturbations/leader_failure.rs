@@ -13,14 +13,14 @@ pub(super) struct LeaderFailure {
 }
 
 impl LeaderFailure {
-    /// All of `n_robots` are well. A robot fails after `time_to_failure`
-    /// consecutive steps of sole leadership.
+    /// The state without faults. A robot fails after `time_to_failure` consecutive steps of sole
+    /// leadership.
     pub fn new(time_to_failure: u32, n_robots: usize) -> Self {
         Self { time_to_failure, leadership: Leadership::default(), faulty: vec![false; n_robots] }
     }
 
-    /// Faulty robots have their LED off and relay, to the end of the episode.
-    /// A robot whose time is up is faulty from the next step on.
+    /// Faulty robots have their LED off and relay, to the end of the episode. A leader that reaches
+    /// its time is faulty from the next step on.
     pub fn rewrite(&mut self, leds: &mut [u32], modes: &mut [Mode]) {
         for ((led, mode), _) in
             leds.iter_mut().zip(modes).zip(&self.faulty).filter(|(_, faulty)| **faulty)

@@ -1,4 +1,4 @@
-//! What goes wrong with the robots of one object, in one trial.
+//! The perturbations of the robots of one object, in one trial.
 
 mod inhibition;
 mod leader_failure;
@@ -13,8 +13,8 @@ use crate::world::RobotGroup;
 use determinism::random::Stream;
 use experiment_file::{PerturbationsConfig, SensorQuery};
 
-/// Stream numbers of the perturbations that draw robots: their places in
-/// [`PerturbationsConfig`]. Part of the format of a run.
+/// Stream numbers of the perturbations that draw robots: their places in [`PerturbationsConfig`].
+/// The numbers are part of the format of a run.
 const INHIBITION_STREAM: usize = 1;
 const ROTATION_STREAM: usize = 3;
 
@@ -29,7 +29,7 @@ pub(crate) struct Perturbations {
 }
 
 impl Perturbations {
-    /// Draws the affected among `n_robots`; `stream` gives the trial's streams for
+    /// Draws the affected robots among `n_robots`; `stream` gives the trial's streams for
     /// perturbations by number.
     pub fn new(
         config: &PerturbationsConfig,
@@ -63,8 +63,8 @@ impl Perturbations {
         self.inhibitions.iter().any(|inhibition| inhibition.inhibits(robot, reading))
     }
 
-    /// Replaces a value of a reading by zero, in a row of the group's robots, where networks do
-    /// not get it.
+    /// Replaces a value of a reading by zero for the robots whose networks do not get it; `row` has
+    /// one value per robot of the group.
     pub fn inhibit(&self, reading: SensorQuery, row: &mut [f32]) {
         for inhibition in &self.inhibitions {
             for (robot, value) in row.iter_mut().enumerate() {

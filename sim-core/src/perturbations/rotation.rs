@@ -1,5 +1,5 @@
-//! `uncontrollable_rotation`: some robots turn to a target heading and hold it,
-//! whatever their network wants.
+//! `uncontrollable_rotation`: some robots turn to a target heading and hold it, whatever their
+//! network decides.
 
 use super::draw_affected;
 use crate::torus::{angular_difference, wrap_angle};
@@ -9,7 +9,7 @@ use experiment_file::UncontrollableRotationConfig;
 /// Distance from the target within which a robot holds its heading, radians.
 const ARRIVED: f64 = 0.15;
 
-/// Who turns where, and when.
+/// The affected robots, their targets, and the steps.
 #[derive(Debug, Clone)]
 pub(super) struct Rotation {
     affected: Vec<bool>,
@@ -17,7 +17,7 @@ pub(super) struct Rotation {
     /// In \[0, 2 pi).
     targets: Vec<f64>,
     switch_at: u32,
-    /// Action of the right wheel, and minus that of the left, while turning.
+    /// Action of the right wheel during a turn; the left wheel gets its negative.
     speed: f64,
 }
 
@@ -37,7 +37,7 @@ impl Rotation {
         }
     }
 
-    /// Takes the wheels of affected robots over.
+    /// Overwrites the wheel actions of affected robots.
     pub fn rewrite(&self, step: u32, headings: &[f64], wheels: &mut [[f64; 2]]) {
         let index = (step / self.switch_at) as usize;
         let Some(&target) = self.targets.get(index).or(self.targets.last()) else { return };

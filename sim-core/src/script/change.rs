@@ -27,7 +27,7 @@ pub(crate) enum May<'a> {
 }
 
 impl May<'_> {
-    /// The advice in the error for any other change.
+    /// The advice in the error about any other change.
     fn advice(&self) -> &'static str {
         match self {
             Self::Look => "keep values for later in `state`, a dict",
@@ -55,7 +55,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Stand, LED off, send zeros.
+    /// The plan to stand still, with the LED off, and to send zeros.
     pub fn new(message_len: usize) -> Self {
         Self { wheels: [0.0; 2], led: 0, mode: Mode::Send, message: vec![0.0; message_len] }
     }
@@ -118,7 +118,7 @@ fn within(least: f64, value: f64, what: &str) -> Result<f64, String> {
     if (least..=1.0).contains(&value) {
         Ok(value)
     } else {
-        Err(format!("{what} is in [{least}, 1], not {value}; `min` and `max` keep it there"))
+        Err(format!("{what} is in [{least}, 1], not {value}; limit it with `min` and `max`"))
     }
 }
 
@@ -132,7 +132,11 @@ fn color(value: &Value) -> Result<u32, String> {
 
 fn switch(value: &Value, name: Named) -> Result<bool, String> {
     let Value::Bool(value) = value else {
-        return Err(format!("`{}` is True or False, not a {}", name.name(), value.kind()));
+        return Err(format!(
+            "`{}` is True or False, not {}",
+            name.name(),
+            value.kind_with_article()
+        ));
     };
     Ok(*value)
 }

@@ -1,6 +1,6 @@
-//! The task that an experiment brings as a script: compiled once, executed in every trial.
-//! `names` has the names for scripts, `view` reads the world for them, `change` makes their
-//! changes, and `sensing` computes their readings.
+//! The script of an experiment's task, compiled once and executed in every trial. `names` has the
+//! names for scripts, `view` reads the world for scripts, `change` makes their changes, and
+//! `sensing` computes readings with them.
 
 mod change;
 mod names;
@@ -31,8 +31,8 @@ const WORK: u64 = 3_000_000;
 const MEMORY: usize = 256 << 10;
 const MEMORY_PER_ROBOT: usize = 4 << 10;
 
-/// The functions of a script, with their numbers of arguments; also `sense` if robots have the
-/// sensor.
+/// The functions of a script, with their numbers of arguments. If robots have a `script_sensor`,
+/// there is also `sense`.
 const FUNCTIONS: [(&str, usize); 6] =
     [("fitness", 1), ("final", 1), ("measures", 1), ("control", 1), ("move", 1), ("react", 1)];
 
@@ -77,7 +77,7 @@ impl ScriptTask {
         let measures = function("measures");
         let measure_names = measures.map(|measures| program.returned_keys(measures));
         if let (Some(measures), Some(None)) = (measures, measure_names) {
-            let message = "returns something else than dicts with literal keys, such as \
+            let message = "returns other values than dicts with literal keys, such as \
                            `return {\"distance\": d}`; the keys are the names of the measures";
             wrong(program.problem(measures, message.into()).to_string());
         }
@@ -108,8 +108,8 @@ impl ScriptTask {
             if function.is_none() {
                 let object = &site.name;
                 let message = format!(
-                    "{file}: has no function `{name}`, to which `world.objects.{object}.controller` \
-                     leaves what `{object}` does"
+                    "{file}: has no function `{name}`, but `world.objects.{object}.controller` \
+                     leaves the actions of `{object}` to it"
                 );
                 problems.add(PATH, message);
             }
@@ -149,11 +149,11 @@ pub(crate) struct ScriptRun<'a> {
     task: &'a ScriptTask,
     script: Script,
     kept: Kept,
-    /// Robots for which it decides, by their numbers.
+    /// Robots for which the script decides, by their numbers.
     actors: Vec<Actor>,
-    /// Lights, and then ground areas, that it moves.
+    /// Lights, and then ground areas, that the script moves.
     movers: Vec<Mover>,
-    /// Robots for which it computes readings, by their numbers.
+    /// Robots for which the script computes readings, by their numbers.
     sensing: Vec<Sensing>,
 }
 
@@ -236,8 +236,8 @@ impl<'a> ScriptRun<'a> {
                 value => Err(task.program.problem(
                     function,
                     format!(
-                        "returns a {}; assign a robot's actions instead, such as `robot.left = 0.5`",
-                        value.kind()
+                        "returns {}; assign a robot's actions instead, such as `robot.left = 0.5`",
+                        value.kind_with_article()
                     ),
                 )),
             });
@@ -260,7 +260,7 @@ impl<'a> ScriptRun<'a> {
             let moved = called.and_then(|value| match value {
                 Value::Nothing => Ok(None),
                 value => view.point(&value).map(Some).map_err(|message| {
-                    let message = format!("returns no place and not None: {message}");
+                    let message = format!("returns neither a place nor None: {message}");
                     task.program.problem(function, message)
                 }),
             });
@@ -284,7 +284,8 @@ impl<'a> ScriptRun<'a> {
         match self.call(function, |_, _| Ok(view::WORLD), view)? {
             Value::Nothing => Ok(()),
             value => {
-                let message = format!("returns a {}; it changes things instead", value.kind());
+                let message =
+                    format!("returns {}; let it change things instead", value.kind_with_article());
                 Err(self.task.program.problem(function, message))
             }
         }
@@ -326,7 +327,7 @@ impl<'a> ScriptRun<'a> {
         let task = self.task;
         let value = self.call(function, |_, _| Ok(view::WORLD), view)?;
         let Value::Dict(values) = &value else {
-            let message = format!("returns a {}, not a dict of numbers", value.kind());
+            let message = format!("returns {}, not a dict of numbers", value.kind_with_article());
             return Err(task.program.problem(function, message));
         };
         for name in &task.measure_names {
@@ -352,7 +353,7 @@ impl<'a> ScriptRun<'a> {
             Some(number) => Err(problem(format!(
                 "returns {number:e}; numbers are finite and at most {LARGEST:e}"
             ))),
-            None => Err(problem(format!("returns a {}, not a number", value.kind()))),
+            None => Err(problem(format!("returns {}, not a number", value.kind_with_article()))),
         }
     }
 }

@@ -9,7 +9,7 @@ macro_rules! names {
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub(super) enum Named { $($variant),* }
 
-        /// All of them, in the order of the vocabulary.
+        /// All attributes and methods, in the order of the vocabulary.
         const ALL: &[Named] = &[$(Named::$variant),*];
 
         /// All names.
@@ -61,7 +61,7 @@ names! {
 }
 
 impl Named {
-    /// The name of a number of the vocabulary.
+    /// The attribute or method with this number in the vocabulary.
     pub fn numbered(name: task_script::Name) -> Self {
         ALL[usize::from(name)]
     }

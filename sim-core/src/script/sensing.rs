@@ -55,8 +55,8 @@ impl ScriptTask {
             for group in sensing {
                 let object = &group.site.name;
                 let message = format!(
-                    "{file}: has no function `sense`, to which \
-                     `world.objects.{object}.sensors.script_sensor` leaves what `{object}` senses"
+                    "{file}: has no function `sense`, but `world.objects.{object}.sensors.script_sensor` \
+                     leaves a reading of `{object}` to it"
                 );
                 problems.add(PATH, message);
             }
@@ -68,7 +68,7 @@ impl ScriptTask {
             }
         } else if FUNCTIONS.iter().all(|(name, _)| self.program.function(name).is_none()) {
             let message =
-                "is the only function, and no robot has a `script_sensor`, which it is for";
+                "is the only function, but no robot has a `script_sensor` that would use it";
             problems.add(PATH, self.program.problem(function, message.into()).to_string());
         }
     }
@@ -100,15 +100,20 @@ impl ScriptRun<'_> {
     }
 }
 
-/// Reads a reading from the result of the function.
+/// Converts the result of the function to a reading.
 fn take(value: &Value, reading: &mut [f64]) -> Result<(), String> {
     let n = reading.len();
     let expected = || format!("a `script_sensor` with `n` {n} needs a list of {n} numbers");
     let Value::List(list) = value else {
-        return Err(format!("returns a {}; {}", value.kind(), expected()));
+        return Err(format!("returns {}; {}", value.kind_with_article(), expected()));
     };
     if list.len() != n {
-        return Err(format!("returns a {} of {}; {}", value.kind(), list.len(), expected()));
+        return Err(format!(
+            "returns {} of {}; {}",
+            value.kind_with_article(),
+            list.len(),
+            expected()
+        ));
     }
     for (place, number) in reading.iter_mut().enumerate() {
         *number = match list.get(place) {
@@ -122,8 +127,8 @@ fn take(value: &Value, reading: &mut [f64]) -> Result<(), String> {
                     ));
                 }
                 None => {
-                    let kind = value.as_ref().map_or("nothing", Value::kind);
-                    return Err(format!("returns a {kind} as element {place}; {}", expected()));
+                    let kind = value.as_ref().map_or("nothing", Value::kind_with_article);
+                    return Err(format!("returns {kind} as element {place}; {}", expected()));
                 }
             },
         };

@@ -36,7 +36,7 @@ fn measured(simulation: &Simulation) -> Vec<Vec<u64>> {
 }
 
 #[test]
-fn every_built_in_task_can_be_said_as_a_script_to_the_same_bits() {
+fn every_built_in_task_has_the_same_bits_as_a_script() {
     macro_rules! script {
         ($name:literal) => {
             include_str!(concat!("../../../configs/tasks/thesis/", $name, ".star"))
@@ -49,7 +49,7 @@ fn every_built_in_task_can_be_said_as_a_script_to_the_same_bits() {
         FitnessFunction::Alignment => (experiment_c(), script!("alignment")),
         FitnessFunction::GotoLight => (experiment_d(), script!("goto_light")),
         FitnessFunction::Grouping => (experiment_d(), script!("grouping")),
-        FitnessFunction::Script => unreachable!("it is the one that is compared"),
+        FitnessFunction::Script => unreachable!("scripts are compared with the other functions"),
     };
     let built_in =
         FitnessFunction::ALL.iter().filter(|function| **function != FitnessFunction::Script);
@@ -61,7 +61,7 @@ fn every_built_in_task_can_be_said_as_a_script_to_the_same_bits() {
         let name = format!("{}.star", function.name());
         let script = Simulation::compile(&with_script(config, &name, text)).unwrap();
         let (rust_values, script_values) = (measured(&rust), measured(&script));
-        // A script may have fewer measures: then only fitness is compared.
+        // A script may lack measures; then the test compares only fitness.
         if script.measure_names().is_empty() {
             for (rust, script) in rust_values.iter().zip(&script_values) {
                 let fitness: Vec<u64> =
@@ -87,7 +87,7 @@ fn failure(text: &str) -> EvaluateError {
 }
 
 #[test]
-fn a_script_that_goes_wrong_ends_its_item_with_file_line_and_reason() {
+fn a_failing_script_ends_its_item_with_file_line_and_reason() {
     for (body, reason) in [
         ("return 1 / (world.step - 5)", "division by zero"),
         ("return 'much'", "`fitness` returns a string, not a number"),
@@ -123,16 +123,13 @@ fn a_script_is_stopped_in_the_middle_of_a_step_and_has_no_result() {
 }
 
 #[test]
-fn scripts_that_cannot_work_are_refused_with_all_that_is_wrong() {
+fn scripts_that_cannot_work_are_refused_with_all_mistakes() {
     for (text, expected) in [
         ("def fitnes(world): return 1", "t.star: has none of the functions `fitness`"),
         ("def fitness(): return 1", "t.star:1: `fitness` takes 1 argument, not 0"),
-        ("def fitness(w): return w.robot", "nothing has a `robot`; did you mean `robots`?"),
+        ("def fitness(w): return w.robot", "no object has a `robot`; did you mean `robots`?"),
         ("def measures(w): return {'a': 1}", "has no function `fitness` or `final`"),
-        (
-            "def fitness(w): return 1\ndef measures(w): return 1",
-            "`measures` returns something else",
-        ),
+        ("def fitness(w): return 1\ndef measures(w): return 1", "`measures` returns other values"),
     ] {
         let config = with_script(experiment_a(), "t.star", text);
         let error = Simulation::compile(&config).unwrap_err();
@@ -142,7 +139,7 @@ fn scripts_that_cannot_work_are_refused_with_all_that_is_wrong() {
 }
 
 #[test]
-fn the_end_of_an_episode_may_decide_and_state_lasts_from_step_to_step() {
+fn final_may_compute_the_fitness_and_state_lasts_from_step_to_step() {
     let text = "def fitness(world):\n    world.state['n'] = world.state.get('n', 0) + 1\n\
                 def final(state):\n    return state['n'] / 4";
     let config = with_script(experiment_a(), "t.star", text);
@@ -153,7 +150,7 @@ fn the_end_of_an_episode_may_decide_and_state_lasts_from_step_to_step() {
 }
 
 #[test]
-fn a_script_measures_beside_a_built_in_fitness() {
+fn a_script_adds_measures_to_a_built_in_fitness() {
     let text = "def measures(world): return {'half': world.step / 2, 'leaders': -1}";
     let mut config = with_script(experiment_a(), "t.star", text);
     config.algorithm.fitness_function = FitnessFunction::IdentifyLeader;
@@ -167,7 +164,7 @@ fn a_script_measures_beside_a_built_in_fitness() {
 }
 
 #[test]
-fn draws_are_the_script_s_own_and_the_same_for_every_genotype() {
+fn scripts_have_their_own_draws_which_are_equal_for_every_genotype() {
     let text = "def fitness(world):\n    return world.random() + 0 * world.normal()";
     let simulation = Simulation::compile(&with_script(experiment_a(), "t.star", text)).unwrap();
     let [a, b] = [0.2, 0.8].map(|gene| {
@@ -179,7 +176,7 @@ fn draws_are_the_script_s_own_and_the_same_for_every_genotype() {
 }
 
 #[test]
-fn the_world_is_seen_as_it_is() {
+fn scripts_see_the_state_of_the_world() {
     let mut config = experiment_d();
     let lights = config.world.objects.values_mut().find_map(|object| match object {
         experiment_file::ObjectConfig::LightSource(light) => Some(light),

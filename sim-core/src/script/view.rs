@@ -1,4 +1,4 @@
-//! The view of a script on a trial. It copies nothing: an object of the world is a kind and a
+//! The view of a script on a trial. The view copies nothing: an object of the world is a kind and a
 //! number, and the view reads its attributes in place.
 
 use std::f64::consts::PI;
@@ -83,7 +83,7 @@ pub(crate) struct View<'a> {
     pub may: May<'a>,
     /// Whether to continue.
     pub goes_on: &'a dyn Fn() -> bool,
-    /// Set by the caller of the script.
+    /// The caller of the script sets it.
     pub kept: Option<&'a mut Kept>,
 }
 
@@ -151,7 +151,7 @@ impl<'a> View<'a> {
     fn position(&self, object: Object) -> Result<Vec2, String> {
         let number = object.index as usize;
         match Kind::of_object(object) {
-            Kind::World => Err("the world has no position; `world.center` has".into()),
+            Kind::World => Err("the world has no position; use `world.center`".into()),
             Kind::Robot => Ok(self.swarm.positions[number]),
             Kind::Light => Ok(self.lights[number]),
             Kind::Area => Ok(self.areas[number]),
@@ -171,7 +171,7 @@ impl<'a> View<'a> {
                     _ => Err("a point is a thing or two finite numbers, `(x, y)`".into()),
                 }
             }
-            _ => Err(format!("a point is a thing or `(x, y)`, not a {}", value.kind())),
+            _ => Err(format!("a point is a thing or `(x, y)`, not {}", value.kind_with_article())),
         }
     }
 
@@ -240,8 +240,8 @@ impl<'a> View<'a> {
     fn sense(&self, robot: usize, reading: &Value, meter: &Rc<Meter>) -> Answer {
         let Some(name) = reading.as_text() else {
             return Err(format!(
-                "`sense` takes the name of a reading, such as \"light_sensor\", not a {}",
-                reading.kind()
+                "`sense` takes the name of a reading, such as \"light_sensor\", not {}",
+                reading.kind_with_article()
             ));
         };
         let number = self.world.group_of(robot);
@@ -273,7 +273,7 @@ impl<'a> View<'a> {
             }
             May::Move { thing, stream } if *thing == object => Ok(stream),
             _ => {
-                Err("draws for itself in `control`, `move` or `sense` only; elsewhere `world` does"
+                Err("draws for itself only in `control`, `move` or `sense`; use `world` elsewhere"
                     .into())
             }
         }
@@ -296,7 +296,7 @@ impl<'a> View<'a> {
 
     fn points(&self, list: &Value) -> Result<Vec<Vec2>, String> {
         let Value::List(list) = list else {
-            return Err(format!("expected a list of things, not a {}", list.kind()));
+            return Err(format!("expected a list of things, not {}", list.kind_with_article()));
         };
         list.items()?.iter().map(|value| self.point(value)).collect()
     }
@@ -442,7 +442,7 @@ fn pair(point: Vec2, meter: &Rc<Meter>) -> Answer {
 }
 
 pub(super) fn number(value: &Value) -> Result<f64, String> {
-    value.number().ok_or_else(|| format!("expected a number, not a {}", value.kind()))
+    value.number().ok_or_else(|| format!("expected a number, not {}", value.kind_with_article()))
 }
 
 fn no_such(kind: Kind, name: Named) -> String {

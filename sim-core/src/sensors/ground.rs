@@ -26,7 +26,7 @@ pub(crate) struct GroundSensor {
 }
 
 impl GroundSensor {
-    /// For those of the world's areas that have its colour.
+    /// A sensor for the areas of this colour.
     fn new(color: &str, world: &World) -> Self {
         Self { areas: StaticObjects::of_color(&world.areas, color).collect() }
     }

@@ -11,14 +11,14 @@ use experiment_file::LightSensorConfig;
 #[derive(Debug, Clone)]
 pub(crate) struct LightSensor {
     decay: Decay,
-    /// Largest angle off a sector's direction at which it sees, radians.
+    /// Largest angle between a sector's direction and a light that it sees, radians.
     aperture: f64,
     noise_deviation: f64,
-    /// Lights of its colour, each with the distance within which it is seen, cm.
+    /// Lights of its colour, each with the distance within which the sensor sees it, cm.
     lights: Vec<(usize, f64)>,
 }
 
-/// For those of the world's lights that have its colour.
+/// A sensor for the lights of its colour.
 pub(super) fn light_sensor(config: &LightSensorConfig, world: &World) -> LightSensor {
     let lights = StaticObjects::of_color(&world.lights, &config.color);
     LightSensor {
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn every_sector_sees_a_light_in_reach() {
-        // 40 cm to the left of a robot that looks along y, across the seam.
+        // The light is 40 cm to the left of a robot that looks along y, across the seam.
         let readings = sense(&[Vec2::new(965.0, 5.0)], 80.0, FRAC_PI_2);
         let strength = |phi: f64| libm::exp(-2.0 - phi);
         let expected = [FRAC_PI_2, 0.0, FRAC_PI_2, PI].map(strength);

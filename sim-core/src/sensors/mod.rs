@@ -1,8 +1,8 @@
 //! Sensors beside the wireless receiver (section 3.2.2 of the thesis). Sector j of
 //! n points to heading + j * 2 pi / n.
 //!
-//! A kind of sensor implements [`Sensor`] in the file of what it measures. A function with the
-//! name of its key in files makes it, and [`mount`] calls that function.
+//! A kind of sensor implements [`Sensor`] in the file of its subject. [`mount`] makes a sensor by
+//! the function with the name of the sensor's key in files.
 
 mod ground;
 mod light;
@@ -34,7 +34,7 @@ pub(crate) trait Sensor: Debug + Send + Sync {
         Noise::NONE
     }
 
-    /// Distance beyond which it senses no other robot, cm; 0: it senses none.
+    /// Distance beyond which it senses no other robot, cm; 0 if it senses no robots.
     fn robots_within(&self) -> f64 {
         0.0
     }
@@ -42,9 +42,9 @@ pub(crate) trait Sensor: Debug + Send + Sync {
     /// Fills in the reading of one robot, without noise.
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]);
 
-    /// Fills in the readings of a group, `[robot][value]`, without noise; those of
-    /// robots whose reading is not wanted are left as they are. It is one virtual
-    /// call per group and step, in which `sense` is none; not to be overridden.
+    /// Fills in the wanted readings of a group, `[robot][value]`, without noise, and leaves the
+    /// others unchanged. This is the only virtual call per group and step: within it, calls of
+    /// `sense` are static. Implementations must not override it.
     fn sense_group(
         &self,
         robots: Range<usize>,
@@ -66,9 +66,9 @@ pub(crate) trait Sensor: Debug + Send + Sync {
 /// Gaussian noise on each value of a reading, one draw each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Noise {
-    /// Standard deviation, in the values' unit; 0: nothing is drawn.
+    /// Standard deviation, in the unit of the values; if it is 0, nothing is drawn.
     pub deviation: f64,
-    /// Which of a robot's streams it is drawn from.
+    /// The stream of a robot from which the noise is drawn.
     pub stream: NoiseStream,
 }
 
@@ -77,23 +77,21 @@ impl Noise {
     pub const NONE: Self = Self { deviation: 0.0, stream: NoiseStream::LIGHT_AND_DISTANCE };
 }
 
-/// One of the streams that the noise of a robot's sensors is drawn from. Every
-/// kind of sensor has its own, so that no reading depends on which other sensors
-/// are mounted. The numbers are part of the format of a run: never reuse one.
+/// One of the streams from which the noise of a robot's sensors is drawn. Every kind of sensor has
+/// its own stream, so that no reading depends on other mounted sensors. The numbers are part of the
+/// format of a run: never reuse one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct NoiseStream(u32);
 
 impl NoiseStream {
-    /// Of the light sensor and, after it, the distance sensor. They share one, in
-    /// this order, because they did so in the first version of the format: with
-    /// streams of their own they would draw other noise, and every run of them would
-    /// be another one.
+    /// The stream of the light sensor and then the distance sensor. They share it, in this order,
+    /// since the first version of the format; streams of their own would change every run with
+    /// these sensors.
     pub const LIGHT_AND_DISTANCE: Self = Self(0);
 
-    /// The stream's number, at [`Purpose::SensorNoise`](determinism::random::Purpose),
-    /// for a robot.
+    /// The number of a robot's stream for [`Purpose::SensorNoise`](determinism::random::Purpose).
     pub fn number(self, robot: usize) -> u64 {
-        // Robots are far fewer.
+        // There are far fewer than 2^32 robots.
         u64::from(self.0) << 32 | robot as u64
     }
 }
@@ -101,7 +99,7 @@ impl NoiseStream {
 /// A sensor of a group of robots, and the reading that it gives.
 #[derive(Debug, Clone)]
 pub(crate) struct MountedSensor {
-    /// The name that stimuli have for the reading.
+    /// The name of the reading in stimuli.
     pub query: SensorQuery,
     /// Number of values of the reading.
     pub reading_len: usize,
@@ -109,8 +107,8 @@ pub(crate) struct MountedSensor {
     pub sensor: Arc<dyn Sensor>,
 }
 
-/// The sensors of a group of robots, in the order of the rows in `sensors!`, in which those that
-/// share a stream of noise draw from it.
+/// The sensors of a group of robots, in the order of the rows in `sensors!`. Sensors that share a
+/// stream of noise draw in this order.
 pub(crate) fn mount(config: &SensorsConfig, world: &World) -> Vec<MountedSensor> {
     let mut mounted = Vec::new();
     let mut add = |query, sensor: Arc<dyn Sensor>| {
@@ -118,7 +116,7 @@ pub(crate) fn mount(config: &SensorsConfig, world: &World) -> Vec<MountedSensor>
         mounted.push(MountedSensor { query, reading_len, sensor });
     };
     macro_rules! mount {
-        // What frames a receiver takes is the radio's business.
+        // The radio chooses the frames of a receiver.
         (wireless_receiver: $($query:ident)*) => {};
         ($key:ident: $query:ident) => {
             if let Some(sensor) = &config.$key {
@@ -130,14 +128,14 @@ pub(crate) fn mount(config: &SensorsConfig, world: &World) -> Vec<MountedSensor>
     mounted
 }
 
-/// What there is to sense beside frames.
+/// Everything that robots can sense beside frames.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surroundings<'a> {
     /// The plane.
     pub torus: &'a Torus,
     /// The robots.
     pub swarm: &'a Swarm,
-    /// Who is near whom, within the largest [`Sensor::robots_within`] at least.
+    /// The neighbours of each robot, at least within the largest [`Sensor::robots_within`].
     pub neighbours: &'a Neighbours,
     /// Positions of all lights.
     pub lights: &'a [Vec2],
@@ -147,7 +145,7 @@ pub(crate) struct Surroundings<'a> {
     pub switches: &'a Switches,
 }
 
-/// How what a robot perceives fades with distance and angle.
+/// The fading of perceived strength with distance and angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Decay {
     /// Per cm.
@@ -173,15 +171,14 @@ impl Decay {
 pub(crate) struct Viewpoint {
     /// Its number.
     pub robot: usize,
-    /// Where it is, cm.
+    /// Its position, cm.
     pub position: Vec2,
-    /// Where it looks, in \[0, 2 pi).
+    /// Its heading, in \[0, 2 pi).
     pub heading: f64,
 }
 
-/// Hands each sector's strength of something at distance `rho` and in direction
-/// `bearing`, in the robot's own frame, to `take`, if it is within `aperture` of the
-/// sector's direction.
+/// Calls `take` with the strength, in each sector, of an object at distance `rho` and in direction
+/// `bearing` in the robot's own frame. Skips sectors whose direction is more than `aperture` away.
 fn take_sectors(
     rho: f64,
     bearing: f64,

@@ -1,4 +1,4 @@
-//! What a robot knows of itself: where it is, where it looks, whether it carries something.
+//! Sensors of a robot's own state: its position, its heading, and whether it carries something.
 
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
@@ -62,7 +62,7 @@ mod tests {
     use crate::torus::{Torus, Vec2};
 
     #[test]
-    fn a_robot_knows_itself() {
+    fn a_robot_senses_its_own_state() {
         let torus = &Torus { width: 1000.0, height: 800.0 };
         let (position, heading) = (Vec2::new(730.0, 20.0), 0.75 * TAU);
         let mut swarm = Swarm::new(vec![Vec2::default(), position], vec![0.0, heading], 0);

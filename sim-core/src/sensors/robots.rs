@@ -1,4 +1,4 @@
-//! Other robots: how near they are per sector, and where the nearest are and look.
+//! Sensors of other robots: their nearness per sector, and positions and headings of the nearest.
 
 use std::ops::RangeInclusive;
 
@@ -43,8 +43,8 @@ pub(super) fn neighborhood_pos_sensor(
     config.clone()
 }
 
-/// Position and heading, in the world's frame, of the nearest robots of all objects, the nearest
-/// first, of equally near ones the one with the lower number. Zeros where there are not so many.
+/// Positions and headings, in the world's frame, of the nearest robots of all objects. The nearest
+/// comes first; of equally near robots, the one with the lower number. Missing robots have zeros.
 impl Sensor for NeighborhoodSensorConfig {
     fn value_range(&self) -> RangeInclusive<f64> {
         0.0..=f64::MAX
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn each_sector_has_its_strongest_robot() {
-        // One 20 cm ahead across the seam, one 50 cm to the left, one out of reach.
+        // The robots are 20 cm ahead across the seam, 50 cm to the left, and out of reach.
         let readings = sense(&[(10.0, 500.0), (990.0, 550.0), (900.0, 500.0)]);
         let strength = |rho: f64, phi: f64| libm::exp(-0.05 * rho - phi);
         let expected = [
@@ -123,13 +123,13 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_does_not_see_itself_but_one_on_top_of_it() {
+    fn a_robot_sees_another_one_on_top_of_it_but_not_itself() {
         assert_eq!(sense(&[(500.0, 500.0)]), [0.0; 4]);
         assert_eq!(sense(&[(990.0, 500.0)])[0], 1.0);
     }
 
     #[test]
-    fn the_nearest_come_first_across_the_seam_and_nobody_is_zeros() {
+    fn the_nearest_come_first_across_the_seam_and_missing_robots_are_zeros() {
         let torus = &Torus { width: 1000.0, height: 1000.0 };
         let places = [(5.0, 5.0), (60.0, 5.0), (985.0, 5.0), (5.0, 60.0), (500.0, 500.0)];
         let headings: Vec<f64> = (0..5).map(f64::from).collect();

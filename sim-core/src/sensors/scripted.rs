@@ -1,4 +1,4 @@
-//! Script sensor: what the function `sense` of the task's script says.
+//! Script sensor: the result of the function `sense` of the task's script.
 
 use std::ops::RangeInclusive;
 
@@ -10,12 +10,12 @@ pub(super) fn script_sensor(config: &ScriptSensorConfig, _: &World) -> ScriptSen
     config.clone()
 }
 
-/// The script fills in the readings, after all other sensors have sensed, and draws its noise.
+/// The script fills in the readings after all other sensors, and draws their noise itself.
 impl Sensor for ScriptSensorConfig {
     fn value_range(&self) -> RangeInclusive<f64> {
         self.low..=self.high
     }
 
-    /// The reading of the step before stays until the script has said the new one.
+    /// The previous reading stays until the script has computed the new one.
     fn sense(&self, _: Viewpoint, _: &Surroundings<'_>, _: &mut [f64]) {}
 }

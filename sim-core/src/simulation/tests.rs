@@ -12,7 +12,7 @@ fn the_genotype_of_experiment_a_has_about_455_genes() {
 }
 
 #[test]
-fn measuring_changes_no_fitness_and_gives_what_watching_shows() {
+fn measuring_changes_no_fitness_and_gives_the_measures_of_watching() {
     let simulation = Simulation::compile(&experiment_a()).unwrap();
     let genotype = genotype(simulation.genotype_len(), 2);
     let trial_set = TrialSet::Evaluation;
@@ -22,7 +22,7 @@ fn measuring_changes_no_fitness_and_gives_what_watching_shows() {
         let measured = simulation.measure_while(&genotype, trial_set, trials, &|| true);
         measured.unwrap().unwrap()
     };
-    // More than fit side by side.
+    // These are more trials than fit side by side.
     let together = measure(0..40);
     let fitness = simulation.evaluate(&genotype, trial_set, 0..40).unwrap();
     assert_eq!(together.len(), 40 * n_values);
@@ -39,7 +39,7 @@ fn measuring_changes_no_fitness_and_gives_what_watching_shows() {
 }
 
 #[test]
-fn trials_of_evaluations_are_those_of_no_generation() {
+fn trials_of_evaluations_differ_from_those_of_generations() {
     let simulation = Simulation::compile(&experiment_a()).unwrap();
     let genotype = genotype(simulation.genotype_len(), 2);
     let start = |trial_set: TrialSet| {
@@ -55,7 +55,7 @@ fn trials_of_evaluations_are_those_of_no_generation() {
 }
 
 #[test]
-fn an_evaluation_stops_when_it_is_told_to() {
+fn an_evaluation_stops_when_keep_going_returns_false() {
     let simulation = Simulation::compile(&experiment_a()).unwrap();
     let genotype = genotype(simulation.genotype_len(), 1);
     let n_asked = std::cell::Cell::new(0);

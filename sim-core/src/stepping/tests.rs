@@ -72,7 +72,7 @@ fn assert_stepping_gives_the_bits(simulation: &Simulation) {
 }
 
 #[test]
-fn agents_decide_by_the_stimuli_that_they_are_given() {
+fn agents_decide_by_the_stimuli_that_the_caller_sets() {
     let simulation = Simulation::compile(&experiment_a()).unwrap();
     let genotype = genotype(simulation.genotype_len(), 3);
     let episode = |changed: Option<f32>| {
@@ -106,7 +106,7 @@ fn agents_decide_by_the_stimuli_that_they_are_given() {
 }
 
 #[test]
-fn what_is_inhibited_stays_so_whatever_agents_are_given() {
+fn inhibited_stimuli_stay_zero_when_the_caller_sets_stimuli() {
     let mut config = experiment_a();
     robot(&mut config).perturbations.stimuli_inhibition = vec![StimuliInhibitionConfig {
         stimuli: InhibitedStimulus::Reading(SensorQuery::ReceiverState),
@@ -121,7 +121,7 @@ fn what_is_inhibited_stays_so_whatever_agents_are_given() {
 }
 
 #[test]
-fn a_silent_robot_is_not_heard_in_the_next_step_only() {
+fn a_silent_robot_is_unheard_in_the_next_step_only() {
     let simulation = Simulation::compile(&experiment_a()).unwrap();
     let genotype = genotype(simulation.genotype_len(), 3);
     let mut stepper = Stepper::new(&simulation, TrialSet::Evaluation, 0..2).unwrap();
@@ -139,15 +139,15 @@ fn a_silent_robot_is_not_heard_in_the_next_step_only() {
         stepper.silence(&silent).unwrap();
         let actions = stepper.decide(&mut policy);
         stepper.step(&actions).unwrap();
-        assert!(stepper.sent().iter().all(|sent| *sent), "whatever networks want");
-        // So every robot with a neighbour hears a frame, and every robot has a neighbour.
+        assert!(stepper.sent().iter().all(|sent| *sent), "all robots send in the first steps");
+        // Every robot has a neighbour, so every robot hears a frame.
         for (index, stimuli) in stepper.stimuli().chunks_exact(n_inputs).enumerate() {
             let hears = stimuli[direction.clone()].iter().any(|value| *value != 0.0);
             assert_eq!(hears, step != 4 || index >= n_agents, "{index}, after step {step}");
         }
     }
     let short = stepper.silence(&[true]);
-    assert!(matches!(short, Err(StepError::Length { what: "silent or not", .. })));
+    assert!(matches!(short, Err(StepError::Length { what: "silence flags", .. })));
 }
 
 #[test]

@@ -16,12 +16,12 @@ pub(super) struct Address {
 }
 
 impl Address {
-    /// The random stream for a purpose of an object.
+    /// The random stream of an object for a purpose.
     pub fn stream(self, purpose: Purpose, number: usize) -> Stream {
         self.numbered_stream(purpose, number as u64)
     }
 
-    /// The same for stream numbers beyond those of objects.
+    /// The random stream of this number for a purpose. The number may exceed those of objects.
     pub fn numbered_stream(self, purpose: Purpose, number: u64) -> Stream {
         Stream::new(self.seed, self.trial_set, self.trial.into(), purpose, number)
     }

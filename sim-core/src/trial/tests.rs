@@ -6,7 +6,7 @@ use crate::testing::{experiment_a, robot};
 use experiment_file::{ExperimentConfig, Initializer, SendingDirection};
 use std::f64::consts::FRAC_PI_2;
 
-/// All robots send before this step.
+/// Number of first steps in which all robots send.
 const SENDING_STEPS: u32 = 10;
 
 /// Robots with heading 0 in a line, 90 cm apart: each hears its neighbours.
@@ -22,7 +22,7 @@ fn line(n: u32) -> ExperimentConfig {
     config
 }
 
-/// Gives robots' networks the sending direction instead of the receiving one.
+/// Gives robots' networks the sending direction instead of the receiving direction.
 fn observe_sending_direction(config: &mut ExperimentConfig) {
     let mut stimuli = config.topology.stimuli.values_mut();
     let direction = stimuli
@@ -72,7 +72,7 @@ fn a_frame_crosses_a_line_one_hop_per_step_and_dies_at_max_hops() {
 }
 
 #[test]
-fn the_sending_direction_is_that_of_the_robot_that_is_heard_or_of_the_originator() {
+fn the_sending_direction_is_that_of_the_emitter_or_of_the_originator() {
     for (whose, expected) in
         [(SendingDirection::Emitter, (0.0, -1.0)), (SendingDirection::Originator, (1.0, 0.0))]
     {
@@ -165,7 +165,7 @@ fn readings_without_a_frame_are_zero_and_the_state_is_the_mode() {
 }
 
 #[test]
-fn the_chosen_frame_is_uniform_among_the_sectors_with_a_valid_one() {
+fn the_choice_is_uniform_among_the_sectors_with_a_valid_frame() {
     let simulation = Simulation::compile(&line(3)).unwrap();
     let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0, &|| true).unwrap();
     step(&mut trial, &[Mode::Send; 3], [0.0; 2]);

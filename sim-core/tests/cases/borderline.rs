@@ -61,7 +61,7 @@ fn scattered_swarms_agree() {
     transmitter_mut(&mut config).range = 110.0;
     let swarm = swarm_mut(&mut config);
     swarm.num_instances = 24;
-    // y is wrapped, so the upper part of the world lies on the lower one.
+    // Positions with y beyond 600 cm wrap to the lower edge of the world.
     swarm.initializers.positions = Initializer::RandomUniform { low: 0.0, high: 650.0, size: 2 };
     swarm.perturbations.topology_switch = Some(TopologySwitchConfig { every: 4 });
     let mut n_interior = 0;
@@ -87,9 +87,9 @@ fn positions_that_are_redrawn_agree() {
 }
 
 #[test]
-fn robots_around_a_hole_are_inside() {
-    // Two rings of 8 and 14 robots. The circle through the inner one is too wide
-    // for the shape: it is a hole, but only the outer ring is the border.
+fn robots_around_a_hole_are_interior() {
+    // Two rings of 8 and 14 robots. The circle through the inner ring is too wide for the shape, so
+    // there is a hole. Still, only the outer ring is the border.
     const INNER: [[f64; 2]; 8] = [
         [582.0, 497.0],
         [560.0, 557.0],
@@ -118,7 +118,7 @@ fn robots_around_a_hole_are_inside() {
     ];
     let mut config = experiment_b();
     config.algorithm.evaluation_steps = 20;
-    // With a robot in its middle there is no hole.
+    // A robot in the middle closes the hole.
     for (middle, n_interior) in [(vec![], 8 * 20), (vec![[500.0, 500.0]], 9 * 20)] {
         let positions = [&INNER[..], &OUTER[..], &middle].concat();
         let swarm = swarm_mut(&mut config);

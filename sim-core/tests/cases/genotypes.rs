@@ -61,8 +61,8 @@ fn genotype_len(config: &ExperimentConfig) -> usize {
 
 #[test]
 fn lengths_match_counts_by_hand() {
-    // Inputs to H1; H1, H2 and between; to the third motor, message and mode;
-    // back to H1; among the motors; bias, tau and gain.
+    // Counts of synapses: from inputs to H1; within and between H1 and H2; to the third motor,
+    // message and mode; back to H1; among the motors. Then bias, tau and gain.
     for (mut config, expected) in [
         (experiment_a(), 50 + 300 + (10 + 20 + 10) + (20 + 10 + 10) + (4 + 2 + 2) + 3 * 24),
         (experiment_c(), 70 + 300 + (10 + 20 + 10) + (20 + 10 + 10) + (4 + 2 + 2 + 1) + 3 * 24),
@@ -78,7 +78,7 @@ fn lengths_match_counts_by_hand() {
 }
 
 #[test]
-fn queries_cover_what_they_name() {
+fn queries_cover_the_parameters_that_they_name() {
     let mut config = experiment_a();
     connect_all(&mut config);
     config.topology.synapses["H2-OUT_ST"].trainable = false;
@@ -137,7 +137,7 @@ fn decoded_networks_agree() {
         ],
     );
 
-    // Fixed weights, defaults of neurons, groups with several ends.
+    // This network has fixed weights, defaults of neurons, and groups with several ends.
     let mut partly_fixed = experiment_a();
     let topology = &mut partly_fixed.topology;
     topology.seed = 5;

@@ -57,7 +57,7 @@ fn swarms_of_every_size_agree() {
 }
 
 #[test]
-fn generations_trials_and_seeds_of_the_experiment_are_told_apart() {
+fn generations_trials_and_seeds_of_the_experiment_give_different_fitness() {
     let mut config = scored_by_every_led();
     config.algorithm.evaluation_steps = 50;
     let genotype = random_genotype(&config, 66);
@@ -105,8 +105,8 @@ fn messages_outside_the_lattice_agree() {
     let mut config = scored_by_every_led();
     config.algorithm.evaluation_steps = 100;
     config.topology.ensembles["OUT_COMM"].activation = Some(Activation::Tanh);
-    // A temperature at which a message left at -1 would choose other symbols than one clipped to
-    // 0.
+    // At this temperature, an unclipped message of -1 would draw other symbols than a message
+    // clipped to 0.
     transmitter_mut(&mut config).beta = 5.0;
     let episodes = assert_lively_agreement(&config);
     assert!(spread(episodes.iter().map(|episode| episode.fitness)) > 0.01);
@@ -134,7 +134,7 @@ fn receivers_and_transmitters_of_every_kind_agree() {
         receiver.decay_phi = decay_phi;
         config.topology.decoding["outC"] = DecodingConfig::ThresholdDecoding { stochastic: true };
         for Episode { witness, .. } in assert_lively_agreement(&config) {
-            // 30 cm reach no robot; a frame has one hop when it is emitted.
+            // A range of 30 cm reaches no robot. A new frame has one hop already.
             let is_silent = sent < 40.0 || max_hops == 1;
             assert_eq!(witness.n_receptions == 0, is_silent, "{witness:?}");
             assert_eq!(witness.n_choices == 0, is_silent || n_sectors == 1, "{witness:?}");
@@ -148,7 +148,7 @@ fn decoders_of_every_kind_agree() {
     let stochastic = DecodingConfig::ThresholdDecoding { stochastic: true };
     let deterministic = DecodingConfig::ThresholdDecoding { stochastic: false };
     let softmax = DecodingConfig::SoftmaxDecoding {};
-    // Message, LED and its neurons, mode and its neurons.
+    // The decoder of messages; decoder and number of neurons of the LED, and of the mode.
     for (message, (led, n_led), (mode, n_mode)) in [
         (DecodingConfig::IdentityDecoding {}, (deterministic, 1), (stochastic, 1)),
         (stochastic, (stochastic, 1), (softmax, 2)),

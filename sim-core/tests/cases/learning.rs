@@ -58,7 +58,7 @@ fn rate_neurons_that_learn_agree() {
 }
 
 #[test]
-fn what_is_rewarded_after_a_delay_agrees() {
+fn learning_by_delayed_reward_agrees() {
     let synapses = ["I1-H1", "H1-H1", "H1-H2"];
     let mut config = plastic(experiment_c(), &synapses, 0.5);
     config.topology.learning.as_mut().expect("it learns").reward =

@@ -64,9 +64,9 @@ fn a_relaying_swarm_that_turns_agrees() {
 
 #[test]
 fn motion_agrees_for_every_kind_of_drive() {
-    // Motion on arcs; then straight ahead, around one wheel, or none. Both cross the border. The
-    // first genotypes avoid wheels that differ only by rounding, because their arc is a small
-    // difference of large numbers.
+    // Robots of the first two cases move on arcs. Robots of the last case move straight ahead,
+    // around one wheel, or not at all. All cross the border. The gentle genotypes avoid wheels that
+    // differ only by rounding, because their arc is a small difference of large numbers.
     let identity = DecodingConfig::IdentityDecoding {};
     let bits = DecodingConfig::ThresholdDecoding { stochastic: true };
     type Genotype = fn(&ExperimentConfig, u64) -> Vec<f64>;
@@ -138,9 +138,8 @@ fn a_robot_between_two_sectors_is_heard_in_both() {
     config.algorithm.evaluation_steps = 60;
     let swarm = swarm_mut(&mut config);
     swarm.num_instances = 2;
-    // Its wheels do not turn: the first robot keeps its heading of 0 and hears
-    // the other exactly between its first two sectors. Every angle involved is
-    // pi/4 or pi/2 to the last bit.
+    // Wheels do not turn, so the first robot keeps its heading of 0 and hears the other robot
+    // exactly between its first two sectors. Every angle involved is pi/4 or pi/2 to the last bit.
     swarm.actuators.wheel_actuator.as_mut().unwrap().max_speed = 0.0;
     swarm.initializers.positions =
         Initializer::Fixed { values: vec![vec![500.0, 500.0], vec![550.0, 550.0]] };

@@ -60,7 +60,7 @@ fn keys_of_rates_agree_for_tanh() {
 }
 
 #[test]
-fn keys_of_lights_and_of_what_sees_them_agree() {
+fn keys_of_lights_and_of_their_sensors_agree() {
     let mut config = experiment_d();
     config.algorithm.evaluation_steps = 150;
     let swarm = swarm_mut(&mut config);

@@ -128,7 +128,7 @@ fn food_areas_and_nests_are_sensed_as_ground_areas_of_their_colours() {
 }
 
 #[test]
-fn robots_that_know_where_they_and_the_nearest_are_agree() {
+fn robots_that_sense_positions_agree() {
     let mut config = all_sensors();
     let without = fitness(&assert_varied_agreement(&config));
     let sensors = &mut swarm_mut(&mut config).sensors;

@@ -107,14 +107,14 @@ fn swarms_with_dynamic_synapses_agree() {
     }
 }
 
-/// A field of each kind that nodes with centres can have.
+/// A triangular, conic or parabolic field with centres from -1 to 1.
 fn sloped(slope: f64, n_neurons: u32, values: [f64; 2], inverted: bool) -> SlopedField {
     let [min_val, max_val] = values;
     SlopedField { slope, n_neurons, min_stim: -1.0, max_stim: 1.0, min_val, max_val, inverted }
 }
 
-/// Encodes the stimuli of experiment C, four with 2, 1, 2 and 2 values, each with an encoder of
-/// its own, except a last one.
+/// Encodes the stimuli of experiment C, which have 2, 1, 2 and 2 values. Each encoded stimulus has
+/// a different encoder; the last stimulus has none.
 pub(super) fn encode(config: &mut ExperimentConfig) {
     let gaussian = GaussianField {
         sigma: 2.0,

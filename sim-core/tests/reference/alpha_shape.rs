@@ -2,9 +2,9 @@
 
 use super::torus::{Torus, Vector, norm};
 
-/// For each robot, whether it is on the alpha shape of its connected component:
-/// components of the graph whose edges are shorter than `range`, shapes of the
-/// triangles with a circumradius under `largest_radius`.
+/// For each robot, whether it is on the alpha shape of its connected component. Robots less than
+/// `range` apart are connected. The shape consists of the triangles with a circumradius under
+/// `largest_radius`.
 pub fn borderline(
     positions: &[Vector],
     torus: Torus,
@@ -78,7 +78,7 @@ fn alpha_shape(points: &[Vector], largest_radius: f64) -> Vec<bool> {
         return vec![true; n];
     }
 
-    // Edges that face the outside; at first, those of the convex hull.
+    // Edges that face the outside. At first, these are the edges of the convex hull.
     let n_at = |edge| triangles.iter().filter(|t: &&Triangle| t.edges.contains(&edge)).count();
     let all_edges = triangles.iter().flat_map(|triangle| triangle.edges);
     let mut outside: Vec<(usize, usize)> = all_edges.filter(|&edge| n_at(edge) == 1).collect();

@@ -29,7 +29,7 @@ pub struct Reception {
     pub signal: f64,
     /// (cos, sin) of the receiving sector in the receiver's own frame.
     pub receiving_direction: Vector,
-    /// (cos, sin) of the sector of the robot that is heard, or of the originator.
+    /// (cos, sin) of the sending sector, of the emitter or of the originator.
     pub sending_direction: Vector,
     /// (cos, sin) of the originator's sector that faced the first robot to hear it.
     pub original_direction: Vector,

@@ -76,7 +76,7 @@ pub fn n_weights(topology: &TopologyConfig) -> Vec<(String, usize)> {
     encoded.collect()
 }
 
-/// `n` numbers from the first to the last.
+/// `n` evenly spaced numbers from `first` to `last`.
 fn evenly(first: f64, last: f64, n: u32) -> Vec<f64> {
     let gaps = if n == 1 { 1.0 } else { f64::from(n) - 1.0 };
     (0..n).map(|i| first + (last - first) * f64::from(i) / gaps).collect()
@@ -111,7 +111,7 @@ impl Encoder {
                     ReceptiveField::Triangular(f) | ReceptiveField::Conic(f) => {
                         (1.0 - f.slope * d).clamp(0.0, 1.0)
                     }
-                    _ => unreachable!("has no centres"),
+                    _ => unreachable!("this field has no centres"),
                 };
                 let x = if inverted { 1.0 - x } else { x };
                 values.push(x * (max - min) + min);

@@ -92,9 +92,9 @@ pub fn goto_light(robots: &[Robot<'_>], lights: &[Light<'_>], torus: Torus, near
     mean(robots.iter().map(|robot| if is_near(robot) { 1.0 } else { 0.0 }))
 }
 
-/// mean clip(1 - distance to the centroid / 100 cm, 0, 1), if no two robots are
-/// within 20 cm of each other; else 0. The centroid of a swarm on a torus is
-/// that of the displacements from its first robot.
+/// mean clip(1 - distance to the centroid / 100 cm, 0, 1), if no two robots are within 20 cm of
+/// each other; else 0. On a torus, the centroid of a swarm is the mean of the displacements from
+/// its first robot.
 pub fn grouping(robots: &[Robot<'_>], torus: Torus) -> f64 {
     let positions = positions(robots);
     let origin = positions[0];

@@ -96,7 +96,7 @@ impl<'a> Light<'a> {
                 let distance = norm(way);
                 let length = match config.step {
                     Some(share) => share * distance,
-                    None => config.speed.expect("one of the two is there"),
+                    None => config.speed.expect("the light has a `speed` or a `step`"),
                 };
                 if distance > 0.0 {
                     self.position = torus.wrap([

@@ -1,9 +1,9 @@
 //! The simulation, transcribed from its equations a second time: one robot at a time, plain
-//! structs, dense matrices, `f64` throughout. It is deliberately slow and obvious, because tests
-//! compare the simulator with it.
+//! structs, dense matrices, `f64` throughout. The code is deliberately slow and obvious, because
+//! tests compare the simulator with it.
 //!
-//! From the project, it uses only the types of a configuration and the random streams (addresses
-//! and order of draws are part of the specification).
+//! From the project, the code uses only the types of a configuration, and the random streams, whose
+//! addresses and order of draws are part of the specification.
 #![allow(
     clippy::disallowed_methods,
     reason = "independence from the simulator's arithmetic, libm included, is the point"

@@ -77,8 +77,8 @@ pub fn neurons_of(topology: &TopologyConfig, name: &str) -> Option<Range<usize>>
     None
 }
 
-/// M_ij ~ B(p): every pair exists with its group's probability, drawn once per
-/// experiment. Their order is their number.
+/// M_ij ~ B(p): every pair exists with its group's probability, drawn once per experiment. Synapses
+/// are numbered in this order.
 fn synapses(topology: &TopologyConfig) -> Vec<Synapse> {
     let mut synapses = Vec::new();
     for (group_idx, (group, config)) in topology.synapses.iter().enumerate() {
@@ -146,7 +146,8 @@ fn bounded_genes(config: &ExperimentConfig, synapses: &[Synapse]) -> Vec<Bounded
                     axons(topology, selector).into_iter().map(Gene::Delay).collect()
                 }
                 GenotypeQuery::Learning(selector) => {
-                    let learning = topology.learning.as_ref().expect("something learns");
+                    let learning =
+                        topology.learning.as_ref().expect("a query of learning needs plasticity");
                     let groups = topology.synapses.keys().enumerate();
                     let selected = groups.filter(|(_, name)| {
                         learning.synapses.contains(name)
@@ -377,7 +378,8 @@ impl Network {
                 tau.push(ensemble.params["tau"]);
                 gain.push(ensemble.params["gain"]);
                 bias.push(ensemble.params["bias"]);
-                activation.push(ensemble.activation.expect("rate neurons have one"));
+                activation
+                    .push(ensemble.activation.expect("rate neurons have an activation function"));
             }
         }
         for (name, neuron, value) in neurons {

@@ -27,7 +27,7 @@ pub struct Readings {
 }
 
 impl Readings {
-    /// The values behind one name (Eq. 3.15); zeros without a reception.
+    /// The values of the reading of this name (Eq. 3.15); zeros without a reception.
     pub fn get(&self, query: SensorQuery, msg_length: usize) -> Vec<f64> {
         let reception = self.reception.as_ref();
         match query {

@@ -249,8 +249,13 @@ impl SpikingNetwork {
                 DecodingConfig::FirstToSpike {} => {
                     let first = &window.first[neurons.clone()];
                     let earliest = first.iter().min().expect("ensembles have neurons");
-                    vec![first.iter().position(|spike| spike == earliest).expect("it is there")
-                        as f64]
+                    vec![
+                        first
+                            .iter()
+                            .position(|spike| spike == earliest)
+                            .expect("the earliest spike is one of them")
+                            as f64,
+                    ]
                 }
                 DecodingConfig::RankOrderDecoding { .. } => weights
                     .chunks(neurons.len())
@@ -271,7 +276,7 @@ impl SpikingNetwork {
                         1.0 / (1.0 + (-3.0 * dot(weights, &a)).exp()) + rest_value - 0.5
                     })
                     .collect(),
-                _ => panic!("decodes no spikes"),
+                _ => panic!("this decoding reads no spikes"),
             };
             let category = match decoding {
                 DecodingConfig::FirstToSpike {} => values[0] as u32,

@@ -28,9 +28,9 @@ pub struct Robot<'a> {
     /// Its network, whose weights change if it learns.
     network: Controller,
     learner: Option<Learner<'a>>,
-    /// State of the network, of rate neurons.
+    /// State of a network of rate neurons.
     pub v: Vec<f64>,
-    /// State of the network, of spiking neurons.
+    /// State of a network of spiking neurons.
     spiking: SpikingState,
     /// Mode in force: send (or relay).
     pub send: bool,
@@ -51,7 +51,11 @@ pub struct Robot<'a> {
 
 impl Robot<'_> {
     pub fn transmitter(&self) -> &WirelessTransmitterConfig {
-        self.config.actuators.wireless_transmitter.as_ref().expect("what is on the air was sent")
+        self.config
+            .actuators
+            .wireless_transmitter
+            .as_ref()
+            .expect("every emitter has a transmitter")
     }
 
     pub fn n_receiver_sectors(&self) -> u32 {
@@ -61,7 +65,7 @@ impl Robot<'_> {
     /// Distance below which two robots of this kind hear each other, cm.
     pub fn communication_range(&self) -> f64 {
         let receiver = self.config.sensors.wireless_receiver.as_ref();
-        let receiver = receiver.expect("the fitness asks who hears whom");
+        let receiver = receiver.expect("the fitness function needs a receiver");
         receiver.range.min(self.transmitter().range)
     }
 
@@ -389,7 +393,7 @@ impl<'a> Simulation<'a> {
         actions
     }
 
-    /// Wheels move, the LED switches, the new frame goes on the air.
+    /// Moves the wheels, switches the LED, and puts the new frame on the air.
     fn act(&mut self, i: usize, reception: Option<Reception>, actions: Actions) {
         let robot = &mut self.robots[i];
         robot.wheels = actions.wheels;
@@ -417,8 +421,8 @@ impl<'a> Simulation<'a> {
         self.witness.max_color = self.witness.max_color.max(robot.led);
     }
 
-    /// Counts the steps of a sole leader; after `time_to_failure` of them it is
-    /// faulty from the next step on.
+    /// Counts the steps of a sole leader. After `time_to_failure` steps, the leader is faulty from
+    /// the next step on.
     fn observe_leader(&mut self) {
         let evaluated = self.evaluated_robots();
         let leds: Vec<u32> = self.robots[evaluated.clone()].iter().map(|robot| robot.led).collect();
@@ -433,7 +437,7 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// The robots that evolve, which alone are evaluated.
+    /// The robots that evolve; only these are evaluated.
     fn evaluated_robots(&self) -> std::ops::Range<usize> {
         let evolvable = &self.config.algorithm.evolvable_object;
         let object_idx = self.config.world.objects.get_index_of(evolvable);

@@ -1,11 +1,11 @@
 //! Plasticity: weights that change while robots live, by a generalised Hebbian rule (Niv, Joel,
 //! Meilijson and Ruppin 2002, Adaptive Behavior 10, 5), with reward after a delay.
 //!
-//! Before every environment step except the first ones, w += rate R (A x_i x_j + B x_i + C x_j +
-//! D) for the synapses of plastic groups, clipped to the largest weight. Without reward, x_i and
-//! x_j are activities of the previous step, and R = 1. With reward, they are activities of an
-//! earlier step, and R is the discounted sum of the rewards since then. Every lane has its own
-//! weights.
+//! Before every environment step except the first ones, w += rate R (A x_i x_j + B x_i + C x_j + D)
+//! for the synapses of plastic groups, clipped to the largest weight. x_i is the activity of the
+//! postsynaptic and x_j that of the presynaptic neuron. Without reward, both are activities of the
+//! previous step, and R = 1. With reward, both are activities of an earlier step, and R is the
+//! discounted sum of the rewards since then. Every lane has its own weights.
 
 use pulp::Simd;
 
@@ -89,8 +89,8 @@ impl Rule {
         self.discounts.as_ref().map_or(1, Vec::len)
     }
 
-    /// Changes the weights at the start of an environment step. `rewards`: of the previous step,
-    /// per lane.
+    /// Changes the weights at the start of an environment step. `rewards`: the rewards of the
+    /// previous step, per lane.
     #[inline(always)]
     pub fn learn<S: Simd, const W: usize>(&self, simd: S, memory: &mut Memory, rewards: &[f32]) {
         let n_slots = self.n_slots();
@@ -133,8 +133,8 @@ impl Rule {
         }
     }
 
-    /// Stores the activities at the end of an environment step. `activities`: of neurons and
-    /// nodes of encoders, times `scale`, `[row][lane]`.
+    /// Stores the activities at the end of an environment step, times `scale`. `activities`: those
+    /// of neurons and nodes of encoders, `[row][lane]`.
     #[inline(always)]
     pub fn remember(
         &self,

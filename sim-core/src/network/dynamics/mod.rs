@@ -33,7 +33,7 @@ pub(crate) trait Dynamics: fmt::Debug {
     /// Writes the spikes of the last environment step for decoders. Rate neurons have none.
     fn write_window(&self, _window: &mut SpikeWindow) {}
 
-    /// Writes voltages, mV: `[neuron][lane]`; false if its neurons have none.
+    /// Writes voltages, mV: `[neuron][lane]`. Returns false if the neurons have none.
     fn write_voltages(&self, _voltages: &mut Lanes) -> bool {
         false
     }
@@ -42,7 +42,7 @@ pub(crate) trait Dynamics: fmt::Debug {
 /// The inputs of a network in an environment step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Inputs<'a> {
-    /// Held for all substeps, `[input][lane]`.
+    /// Constant for all substeps, `[input][lane]`.
     pub stimuli: &'a Lanes,
     /// Uniform random numbers, substep by substep one for each of `Network::n_drawing` nodes,
     /// `[draw][lane]`.
@@ -57,7 +57,7 @@ pub(crate) struct Inputs<'a> {
 pub(crate) struct SpikeWindow {
     /// Numbers of spikes.
     pub counts: Lanes,
-    /// The substep of the first spike, from 0; the number of substeps without one.
+    /// The substep of the first spike, from 0; without a spike, the number of substeps.
     pub first: Lanes,
     /// a of `LinearPopulationDecoding`, over all steps.
     pub filtered: Lanes,
@@ -68,7 +68,7 @@ pub(crate) struct SpikeWindow {
 pub(crate) enum Wiring {
     /// [`NeuronModel::Rate`]
     Rate(ctrnn::Wiring),
-    /// All others.
+    /// All spiking models.
     Spiking(spiking::Wiring),
 }
 
@@ -100,7 +100,7 @@ impl Wiring {
 pub(crate) struct NetworkState {
     dynamics: Box<dyn Dynamics>,
     n_lanes: usize,
-    /// `[neuron][lane]`. Read for every robot, hence not behind the trait.
+    /// `[neuron][lane]`. It is read for every robot, so it is not behind the trait.
     activity: Lanes,
     /// `None` for rate neurons.
     window: Option<SpikeWindow>,
@@ -131,7 +131,7 @@ impl NetworkState {
         Self { dynamics, n_lanes, activity, window, streams: Vec::new(), draws, rewards }
     }
 
-    /// The same with a stream of random numbers per lane, for encoders that draw.
+    /// The same network with a stream of random numbers per lane, for encoders that draw.
     pub fn drawing_from(self, streams: Vec<Stream>) -> Self {
         Self { streams, ..self }
     }
@@ -143,7 +143,7 @@ impl NetworkState {
         }
     }
 
-    /// Advances by one environment step, `stimuli` being held: `[input][lane]`.
+    /// Advances by one environment step with constant `stimuli`, `[input][lane]`.
     pub fn step(&mut self, stimuli: &Lanes) {
         for (lane, stream) in self.streams.iter_mut().enumerate() {
             for draw in 0..self.draws.n_rows() {

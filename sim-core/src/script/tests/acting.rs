@@ -53,7 +53,7 @@ pub(super) fn failure(config: &ExperimentConfig) -> String {
 }
 
 #[test]
-fn the_lights_of_the_thesis_and_of_the_original_can_be_said_as_scripts_to_the_same_bits() {
+fn the_lights_of_the_thesis_and_of_the_original_have_the_same_bits_as_scripts() {
     let mut short = experiment_d();
     // The orbit turns back about once in 100 steps.
     short.algorithm.evaluation_steps = 400;
@@ -74,7 +74,7 @@ fn the_lights_of_the_thesis_and_of_the_original_can_be_said_as_scripts_to_the_sa
 }
 
 #[test]
-fn robots_do_what_control_assigns_and_stand_dark_otherwise() {
+fn control_assigns_actions_and_robots_stand_dark_by_default() {
     let text = "\
 def control(robot):
     if robot.id == 1:
@@ -94,9 +94,9 @@ def fitness(world):
     assert_eq!(steps[20].fitness, Some(1.0));
 }
 
-/// All robots decide at the same time, in whatever order the script is called for them.
+/// All robots decide at the same time, so the order of the calls does not matter.
 #[test]
-fn a_robot_sees_what_others_did_not_what_they_are_about_to_do() {
+fn a_robot_sees_the_previous_actions_of_others_not_their_plans() {
     let text = "\
 def control(robot):
     robot.left = (robot.world.step % 2) / 2
@@ -110,8 +110,8 @@ def fitness(world):
 }
 
 #[test]
-fn what_a_robot_senses_is_what_its_network_would_get() {
-    // In D most robots' networks do not get the light.
+fn a_robot_senses_the_stimuli_that_its_network_would_get() {
+    // In experiment D, most robots' networks do not get the light.
     let text = "\
 def control(robot):
     light = robot.sense('light_sensor')
@@ -142,7 +142,7 @@ def fitness(world):
 }
 
 #[test]
-fn robots_draw_from_streams_of_their_own_whoever_else_draws() {
+fn robots_draw_from_streams_of_their_own() {
     let text = |who: &str| {
         format!(
             "def control(robot):\n    if {who}:\n        robot.right = robot.random()\n\
@@ -211,7 +211,7 @@ def fitness(world):
     let n_heard =
         |range: std::ops::Range<usize>| steps[range].iter().filter(|step| hears_it(step)).count();
     assert!(n_heard(0..21) > 0 && n_heard(41..60) > 0);
-    // The script fails it at the end of step 20.
+    // At the end of step 20, the script makes the robot fail.
     assert_eq!(n_heard(21..41), 0);
     for step in &steps {
         assert_eq!(step.robots[0].failed, (20..40).contains(&step.step), "step {}", step.step);
@@ -222,7 +222,7 @@ def fitness(world):
 }
 
 #[test]
-fn sensors_do_not_see_what_is_off_and_things_move_where_the_script_says() {
+fn sensors_do_not_see_things_that_are_off_and_the_script_moves_things() {
     let text = "\
 def control(robot):
     robot.state['seen'] = max(robot.sense('light_sensor')) + robot.sense('ground_sensor')[0]
@@ -272,7 +272,7 @@ def fitness(world):
 }
 
 #[test]
-fn what_goes_wrong_says_where_why_and_for_whom() {
+fn errors_name_their_place_reason_and_object() {
     let fitness = "def fitness(world):\n    return 1\n";
     for (body, reason) in [
         ("robot.left = 2", "t.star:2: the action of a wheel is in [-1, 1], not 2"),
@@ -285,8 +285,8 @@ fn what_goes_wrong_says_where_why_and_for_whom() {
         ("robot.world.robots[1].left = 1", "for robot 0"),
         ("robot.sense('light')", "have no reading `light`; did you mean `light_sensor`?"),
         ("robot.sense(1)", "`sense` takes the name of a reading"),
-        ("return 1", "returns a int; assign a robot's actions instead"),
-        ("robot.world.lights[0].random()", "draws for itself in `control`, `move` or `sense` only"),
+        ("return 1", "returns an int; assign a robot's actions instead"),
+        ("robot.world.lights[0].random()", "draws for itself only in `control`, `move` or `sense`"),
         ("[0 for i in range(999) for j in range(999) if False]", "does too much"),
     ] {
         let text = format!("def control(robot):\n    {body}\n{fitness}");
@@ -298,7 +298,7 @@ fn what_goes_wrong_says_where_why_and_for_whom() {
         );
     }
     for (body, reason) in [
-        ("return 'away'", "`move` returns no place and not None: a point is"),
+        ("return 'away'", "`move` returns neither a place nor None: a point is"),
         ("return (math.inf, 0)", "a point is a thing or two finite numbers"),
         ("thing.x = 3", "`move` returns the new place"),
         ("return (0, thing.robots)", "a light has no `robots`"),
@@ -316,10 +316,10 @@ fn what_goes_wrong_says_where_why_and_for_whom() {
         );
     }
     for (body, reason) in [
-        ("world.robots[0].failed = 1", "`failed` is True or False, not a int"),
+        ("world.robots[0].failed = 1", "`failed` is True or False, not an int"),
         ("world.robots[0].led = 1", "`react` sets `failed` and `carries` of robots"),
         ("world.step = 1", "`step` of the world cannot be changed here"),
-        ("return True", "returns a bool; it changes things instead"),
+        ("return True", "returns a bool; let it change things instead"),
     ] {
         let text = format!("def react(world):\n    {body}\n{fitness}");
         let error = failure(&with_script(experiment_a(), "t.star", &text));
@@ -328,14 +328,11 @@ fn what_goes_wrong_says_where_why_and_for_whom() {
 }
 
 #[test]
-fn a_world_that_leaves_things_to_a_script_needs_the_functions() {
+fn a_world_with_script_controllers_needs_their_functions() {
     let mut config = controlled("def fitness(world):\n    return 1", 10);
     *light(&mut config) = LightController::ScriptController {};
     let error = Simulation::compile(&config).unwrap_err().to_string();
     for function in ["control", "move"] {
-        assert!(
-            error.contains(&format!("t.star: has no function `{function}`, to which")),
-            "{error}"
-        );
+        assert!(error.contains(&format!("t.star: has no function `{function}`, but")), "{error}");
     }
 }

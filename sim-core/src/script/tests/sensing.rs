@@ -11,8 +11,8 @@ use crate::simulation::Simulation;
 use crate::stepping::Stepper;
 use crate::testing::{experiment_a, experiment_d, genotype};
 
-/// Experiment D with `n_steps` steps, whose robots have a `script_sensor` of two values from -1
-/// to 2, which their networks get.
+/// Experiment D with `n_steps` steps. Its robots have a `script_sensor` of two values from -1 to 2,
+/// and their networks get these values.
 fn sensing(text: &str, n_steps: u32) -> ExperimentConfig {
     let config = with_script(experiment_d(), "t.star", text);
     let mut file = serde_json::to_value(&config).unwrap();
@@ -44,7 +44,7 @@ fn said(config: &ExperimentConfig, robot: usize) -> Vec<[f64; 2]> {
 const FITNESS: &str = "\ndef fitness(world):\n    return 1\n";
 
 #[test]
-fn what_sense_returns_is_what_networks_get_in_the_same_step_within_the_range_of_the_sensor() {
+fn networks_get_the_result_of_sense_in_the_same_step_within_the_range_of_the_sensor() {
     let text = "def sense(robot):\n    return (robot.id / 4 - robot.world.step, robot.id >= 2)";
     let config = sensing(&format!("{text}{FITNESS}"), 3);
     assert_eq!(said(&config, 1), [[0.25, 0.0], [-0.75, 0.0], [-1.0, 0.0]]);
@@ -54,7 +54,7 @@ fn what_sense_returns_is_what_networks_get_in_the_same_step_within_the_range_of_
 }
 
 #[test]
-fn a_script_senses_with_other_sensors_of_this_step_and_with_its_own_of_the_last_one() {
+fn a_script_reads_other_sensors_of_this_step_and_its_own_of_the_previous_step() {
     let text = "\
 def sense(robot):
     last = robot.sense('script_sensor')
@@ -81,7 +81,7 @@ def fitness(world):
 }
 
 #[test]
-fn a_robot_whose_controller_is_the_script_reads_its_script_sensor_too() {
+fn a_robot_with_a_script_controller_reads_its_script_sensor_too() {
     let text = "\
 def sense(robot):
     return [robot.world.step / 8, 0]
@@ -159,7 +159,7 @@ def fitness(world):
 }
 
 #[test]
-fn what_goes_wrong_says_where_why_and_for_whom() {
+fn errors_name_their_place_reason_and_object() {
     for (body, reason) in [
         (
             "return [1, math.inf]",
@@ -171,17 +171,17 @@ fn what_goes_wrong_says_where_why_and_for_whom() {
             "returns a list of 1; a `script_sensor` with `n` 2 needs a list of 2 numbers",
         ),
         ("return range(3)", "returns a list of 3; a `script_sensor` with `n` 2"),
-        ("return 1", "returns a int; a `script_sensor` with `n` 2 needs a list of 2 numbers"),
+        ("return 1", "returns an int; a `script_sensor` with `n` 2 needs a list of 2 numbers"),
         ("return 'ab'", "returns a string; a `script_sensor`"),
-        ("pass", "returns a None; a `script_sensor`"),
+        ("pass", "returns None; a `script_sensor`"),
         ("return [1, 'x']", "returns a string as element 1; a `script_sensor`"),
-        ("return [1, None]", "returns a None as element 1; a `script_sensor`"),
+        ("return [1, None]", "returns None as element 1; a `script_sensor`"),
         ("return [1, 1 / 0]", "t.star:2: division by zero"),
         ("robot.left = 1", "`left` of a robot cannot be changed here; `sense` returns a list"),
         ("robot.carries = True", "`carries` of a robot cannot be changed here; `sense` returns"),
         (
             "return [robot.world.robots[1].random(), 0] if robot.id == 0 else [0, 0]",
-            "draws for itself in `control`, `move` or `sense` only",
+            "draws for itself only in `control`, `move` or `sense`",
         ),
         ("[0 for i in range(999) for j in range(999) if False]", "does too much"),
     ] {
@@ -192,9 +192,9 @@ fn what_goes_wrong_says_where_why_and_for_whom() {
 }
 
 #[test]
-fn a_sensor_needs_the_function_and_without_the_sensor_its_name_is_anybodys() {
+fn a_script_sensor_needs_sense_which_is_otherwise_an_ordinary_name() {
     let error = Simulation::compile(&sensing(FITNESS, 10)).unwrap_err().to_string();
-    assert!(error.contains("t.star: has no function `sense`, to which `world.objects.robotA.sensors.script_sensor` leaves"), "{error}");
+    assert!(error.contains("t.star: has no function `sense`, but `world.objects.robotA.sensors.script_sensor` leaves"), "{error}");
     let helper = "def sense(robot, factor):\n    return factor * robot.x";
     let error = Simulation::compile(&sensing(&format!("{helper}{FITNESS}"), 10)).unwrap_err();
     assert!(error.to_string().contains("t.star:1: `sense` takes 1 argument, not 2"), "{error}");

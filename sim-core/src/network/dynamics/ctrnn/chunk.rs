@@ -48,7 +48,7 @@ impl Chunk {
         chunk
     }
 
-    /// Advances by one environment step, `stimuli` being held: `[input][lane]`.
+    /// Advances by one environment step with constant `stimuli`, `[input][lane]`.
     pub fn advance(&mut self, kernel: &Kernel, stimuli: &Lanes, isa: Isa) {
         self.dispatch(isa, kernel, Task::Advance(stimuli));
     }

@@ -8,7 +8,7 @@ use super::wiring::{WiredBlocks, WiredCoupling, Wiring};
 use crate::network::{Network, Phenotype};
 use experiment_file::{Activation, InitialRates};
 
-/// The blocks of a [`Wiring`] with their values.
+/// The blocks of a [`Wiring`], with the values of a genotype.
 #[derive(Debug)]
 pub(super) struct Kernel {
     pub n_substeps: u32,
@@ -45,7 +45,7 @@ pub(super) struct Block<const N: usize> {
     pub afferent: Range<usize>,
 }
 
-/// Synapses of one row with the neurons of a block. A block adds them up by ascending rows: the
+/// Synapses from one row to the neurons of a block. A block adds them up by ascending rows: the
 /// order is part of the format of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Coupling<const N: usize> {

@@ -9,15 +9,16 @@
 //!
 //! y(t+dt) = (1 - r) * y + r * k * g * (W_N u + W_I phi + beta), u = F(y),
 //!
-//! with beta / g in place of beta where the gain does not multiply the bias, and with one multiply-add per synapse and one per neuron; W_I phi is constant
-//! within an environment step. It is computed in f32, which `docs/notebook/2026-11-simulation.md`
-//! justifies; all constants are computed in f64 and rounded once.
+//! with beta / g in place of beta where the gain does not multiply the bias. A step takes one
+//! multiply-add per synapse and one per neuron; W_I phi is constant within an environment step. The
+//! state is computed in f32, which `docs/notebook/2026-11-simulation.md` justifies. All constants
+//! are computed in f64 and rounded once.
 //!
 //! All lanes share the weights, and never interact. [`chunk`] computes whole vectors of lanes, in
 //! blocks of neurons that share the loads of presynaptic activities. [`remainder`] computes the
 //! remaining lanes, to the same bits. Two neurons share a division; the pairs depend only on the
-//! network's structure. [`plastic`] computes networks whose weights change while robots live;
-//! there, every lane has its own weights.
+//! network's structure. [`plastic`] computes networks whose weights change while robots live; in
+//! these networks, every lane has its own weights.
 
 mod chunk;
 mod kernel;
@@ -68,7 +69,7 @@ impl Ctrnn {
         let vector_len = isa.vector_len();
         let (mut n_vectors, mut n_left) = (n_lanes / vector_len, n_lanes % vector_len);
         // A vector of lanes costs one vector operation per row. A lane of a remainder costs one
-        // per group of as many rows as a vector has lanes.
+        // vector operation per `vector_len` rows.
         let n_vectors_per_lane = kernel.n_rows().div_ceil(2 * vector_len) * 2;
         if 2 * n_left * n_vectors_per_lane > kernel.n_rows() {
             (n_vectors, n_left) = (n_vectors + 1, 0);

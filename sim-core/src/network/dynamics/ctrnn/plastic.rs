@@ -1,5 +1,5 @@
-//! The network with plastic weights, which every lane has for itself: the same equations, synapse
-//! by synapse.
+//! The network with plastic weights: the same equations, synapse by synapse, because every lane has
+//! its own weights.
 //!
 //! y(t+dt) = (1 - r) y + r k g (W_N u + W_I phi) + r k g beta, with beta / g in place of beta
 //! where the gain does not multiply the bias.

@@ -16,8 +16,8 @@ use experiment_file::{Activation, InitialRates};
 /// Lanes of a remainder, at most.
 pub(super) const MAX_LANES: usize = 4;
 
-/// A kernel in vectors of neurons. A bundle has as many pairs of neurons as a vector has lanes,
-/// in two vectors: one of the first and one of the second neurons of its pairs.
+/// A kernel in vectors of neurons. A bundle has as many pairs of neurons as a vector has lanes. It
+/// consists of two vectors: the first and the second neurons of its pairs.
 #[derive(Debug)]
 pub(super) struct Bundles {
     n_substeps: u32,
@@ -139,7 +139,7 @@ impl Remainder {
         remainder
     }
 
-    /// Advances by one environment step, `stimuli` being held: `[input][lane]`.
+    /// Advances by one environment step with constant `stimuli`, `[input][lane]`.
     pub fn advance(&mut self, bundles: &Bundles, stimuli: &Lanes, isa: Isa) {
         self.dispatch(isa, bundles, Task::Advance(stimuli));
     }

@@ -1,6 +1,6 @@
 //! The activation functions, for two neurons at a time.
 //!
-//! Both are ratios of expressions in 2^y, where y is the argument scaled by
+//! Both functions are ratios of expressions in 2^y, where y is the argument scaled by
 //! [`scale`]: sigmoid(x) = 1 / (1 + 2^y) and tanh(x) = (2^y - 1) / (2^y + 1). One
 //! division serves two neurons: a/b and c/d are a*d and c*b over b*d. Everything
 //! is IEEE arithmetic with fused multiply-adds, so all instruction sets agree.
@@ -96,7 +96,7 @@ mod tests {
     use crate::exp2::MAX_EXPONENT;
     use determinism::Isa;
 
-    /// Both functions of every y of a slice, paired with some other y.
+    /// Both activation functions of every y of a slice, each paired with some other y.
     struct Squash<'a> {
         activation: Activation,
         y: &'a [f32],

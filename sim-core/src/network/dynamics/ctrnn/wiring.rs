@@ -11,8 +11,8 @@ use crate::network::Ensemble;
 use crate::network::connections::{Source, Synapse};
 use experiment_file::Activation;
 
-/// Neurons in blocks of four, and the remaining ones of ensembles in blocks of two. A neuron's
-/// row is its position, blocks of four first. Rows 2k and 2k+1 are a pair, which shares a
+/// Neurons in blocks of four, and the remaining neurons of the ensembles in blocks of two. A
+/// neuron's row is its position, blocks of four first. Rows 2k and 2k+1 are a pair, which shares a
 /// division.
 #[derive(Debug, Clone)]
 pub(crate) struct Wiring {
@@ -47,7 +47,7 @@ pub(crate) struct WiredBlock<const N: usize> {
     pub afferent: Range<usize>,
 }
 
-/// Synapses of one row with the neurons of a block, which has them by ascending rows.
+/// Synapses from one row to the neurons of a block. A block has its couplings by ascending rows.
 #[derive(Debug, Clone)]
 pub(crate) struct WiredCoupling<const N: usize> {
     /// Row of the presynaptic neuron or input.
@@ -144,8 +144,8 @@ struct Members {
 }
 
 impl Members {
-    /// First neighbours within an ensemble, because they share most of their presynaptic neurons,
-    /// then the remaining neurons of all ensembles.
+    /// First joins neighbours within an ensemble, because they share most of their presynaptic
+    /// neurons, and then the remaining neurons of all ensembles.
     fn from_ensembles(ensembles: &IndexMap<String, Ensemble>) -> Self {
         let (mut quads, mut pairs) = (Vec::new(), Vec::new());
         let mut left_over = [(Activation::Sigmoid, None), (Activation::Tanh, None)];

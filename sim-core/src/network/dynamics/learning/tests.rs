@@ -1,4 +1,5 @@
-//! Compares networks that learn with themselves, and with networks that do not.
+//! Compares learning networks with themselves under other conditions, and with networks that do not
+//! learn.
 
 use std::ops::Range;
 
@@ -26,7 +27,7 @@ fn experiments() -> [ExperimentConfig; 3] {
     for group in dynamic.topology.synapses.values_mut() {
         group.transmitter = Some(Neurotransmitter::AmpaNmda);
     }
-    // With reversal potentials, weights of 1 are strong.
+    // With reversal potentials, weights of 1 would be strong.
     let population = &mut dynamic.algorithm.populations[0];
     (population.min_vals, population.max_vals) = (vec![-1.0], vec![3.0]);
     let receptive_field = ReceptiveField::Linear(LinearField { n_neurons: 4 });
@@ -95,7 +96,7 @@ fn bits(values: Vec<f32>) -> Bits {
 }
 
 #[test]
-fn what_does_not_learn_is_as_if_it_could_not() {
+fn a_learning_rate_of_zero_gives_the_same_activities_as_rigid_weights() {
     for config in experiments() {
         let rigid = activities(&compiled(&config), Isa::best(), 0..3, 1);
         let still = compiled(&plastic(&config, 0.0, None));

@@ -1,7 +1,7 @@
-//! Adaptive exponential integrate and fire (Brette and Gerstner 2005) as SpikeSwarmSim has
-//! it: v += dt / tau_m (V_rest - v + 2 exp((v - theta) / 2) - w + I), at most 30 mV; a
-//! spike there, s = 1, then v = V_reset; w += dt / tau_w (A (v - V_rest) - w + B tau_w s);
-//! theta += dt ((1 - s) (theta_rest - theta) / 50 + 20 s).
+//! Adaptive exponential integrate and fire (Brette and Gerstner 2005) as SpikeSwarmSim has it: v +=
+//! dt / tau_m (V_rest - v + 2 exp((v - theta) / 2) - w + I), at most 30 mV; at 30 mV a spike, s =
+//! 1, then v = V_reset; w += dt / tau_w (A (v - V_rest) - w + B tau_w s); theta += dt ((1 - s)
+//! (theta_rest - theta) / 50 + 20 s).
 
 use pulp::Simd;
 

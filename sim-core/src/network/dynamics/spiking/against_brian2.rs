@@ -99,7 +99,7 @@ fn every_model_spikes_and_moves_as_in_brian2() {
     }
 }
 
-/// Two neurons that release AMPA and NMDA, two that release GABA, each with a current.
+/// Two neurons release AMPA and NMDA, two release GABA, and each has a current.
 #[test]
 fn dynamic_synapses_work_as_in_brian2() {
     let fixture = fixture();

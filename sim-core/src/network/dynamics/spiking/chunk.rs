@@ -28,8 +28,8 @@ pub(super) struct Chunk {
     n_variables: usize,
     /// `[neuron][variable][lane]`
     state: Aligned,
-    /// 1 where a neuron spiked in the last substep, or a node of an encoder in this one, else
-    /// 0: `[neuron, then node][lane]`.
+    /// 1 if a neuron spiked in the previous substep, or if a node of an encoder spikes in this
+    /// substep, else 0: `[neuron, then node][lane]`.
     spikes: Aligned,
     /// The neurons and nodes with a spike in any lane, ascending.
     active: Vec<usize>,

@@ -110,8 +110,8 @@ impl Weighted {
     }
 }
 
-/// The weight of a synapse in W vectors of lanes: the shared one, or with PLASTIC each lane's
-/// present one, `[synapse]`.
+/// The weight of a synapse in W vectors of lanes: the shared weight, or with PLASTIC the present
+/// weight of each lane, `[synapse]`.
 #[inline(always)]
 pub(super) fn weight<S: Simd, const W: usize, const PLASTIC: bool>(
     simd: S,

@@ -1,11 +1,11 @@
 //! Encoders: stimuli pass receptive fields, whose nodes spike.
 //!
-//! A radial field has a node for each of its centres c: with d = s - c and k its steepness,
-//! x = exp(-k d^2), max(1 - k |d|, 0) or max(1 - k d^2, 0), scaled to x (max - min) + min.
-//! Per node and substep, which counts as 1 ms, there is a spike where
-//! - a LIF neuron with its default parameters and the current x has one;
+//! A radial field has a node for each of its centres c: with d = s - c and k its steepness, x =
+//! exp(-k d^2), max(1 - k |d|, 0) or max(1 - k d^2, 0), scaled to x (max - min) + min. A substep
+//! counts as 1 ms. A node spikes in a substep if
+//! - a LIF neuron with its default parameters and the current x spikes (LIF);
 //! - a uniform number is below 1 - s, after s -= x / 10,000 s; then s = 1 (Poisson);
-//! - the substep, from 1, is x rounded down, x within 1 and the last one (rank order).
+//! - the number of the substep, from 1, is x rounded down and clipped to the substeps (rank order).
 
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ use experiment_file::{
 };
 
 /// Number of variables of a node: v and refractory substeps in LIF encoders, survival in Poisson
-/// ones.
+/// encoders.
 const N_VARIABLES: usize = 2;
 
 /// The encoders of a network, with the weights of a genotype.
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_have_their_values() {
+    fn nodes_have_the_values_of_their_field() {
         let gaussian = GaussianField {
             sigma: 6.0,
             n_neurons: 2,
@@ -422,7 +422,7 @@ mod tests {
         let identity = ReceptiveField::Identity {};
         let (_, trains) =
             respond_to(EncodingScheme::RankOrder, identity, &[], &[-3.0, 99.0, 20.0], 1);
-        assert!(trains[0][0] && trains[19][1] && trains[19][2], "ranks are cut");
+        assert!(trains[0][0] && trains[19][1] && trains[19][2], "ranks are clipped");
         assert_eq!(counts(&trains), [1, 1, 1]);
     }
 
@@ -446,10 +446,10 @@ mod tests {
         assert_eq!(expected[0], 0);
     }
 
-    /// The probability of no spike for k substeps is the product of (1 - x / 10,000)^j for j from
-    /// 1 to k; the sum of these is the mean interval.
+    /// The probability of no spike for k substeps is the product of (1 - x / 10,000)^j for j from 1
+    /// to k. The sum of these probabilities is the mean interval.
     #[test]
-    fn poisson_nodes_spike_as_often_as_their_survival_says() {
+    fn poisson_nodes_spike_as_often_as_their_survival_predicts() {
         let identity = ReceptiveField::Identity {};
         let rates = [0.0, 20.0, 1_000.0, 10_000.0, 99_999.0, -5.0];
         let n_steps = 20_000;

@@ -1,6 +1,6 @@
-//! Exponential integrate and fire (Fourcaud-Trocme et al. 2003) as SpikeSwarmSim has it:
-//! v += dt / tau (v_rest - v + 0.3 exp(v - thresh) + 0.6 I), at most 30 mV; a spike
-//! there, then v = v_rest, and I = 0 for `time_refrac` substeps.
+//! Exponential integrate and fire (Fourcaud-Trocme et al. 2003) as SpikeSwarmSim has it: v += dt /
+//! tau (v_rest - v + 0.3 exp(v - thresh) + 0.6 I), at most 30 mV; at 30 mV a spike, then v =
+//! v_rest, and I = 0 for `time_refrac` substeps.
 
 use pulp::Simd;
 

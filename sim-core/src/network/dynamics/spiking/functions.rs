@@ -1,7 +1,7 @@
 //! Functions of the neuron models, from IEEE arithmetic with fused multiply-adds alone.
 //!
-//! Relative errors: exp 3e-6 for |x| <= 43, beyond which it stays at about 2^63 or 2^-63; cosh
-//! likewise; tanh 3e-7.
+//! Relative errors: 3e-6 of exp and cosh for |x| <= 43, beyond which exp stays at about 2^63 or
+//! 2^-63; 3e-7 of tanh.
 
 use std::f32::consts::LOG2_E;
 
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_the_argument_there_is_a_number() {
+    fn functions_of_any_argument_are_numbers() {
         let large = [f32::MAX; 64];
         let small = [f32::MIN; 64];
         for x in [large, small] {

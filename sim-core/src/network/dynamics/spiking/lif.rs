@@ -35,7 +35,7 @@ impl Model<5, 2> for Lif {
     }
 }
 
-/// The effective current of a neuron, and its refractory substeps after this one.
+/// The effective current of a neuron, and its refractory substeps after this substep.
 #[inline(always)]
 pub(super) fn gate<S: Simd>(simd: S, waiting: S::f32s, current: S::f32s) -> (S::f32s, S::f32s) {
     let zero = simd.splat_f32s(0.0);

@@ -1,7 +1,7 @@
 //! Networks of spiking neurons, by synchronous Euler steps (section 4.1 of the thesis): in every
-//! substep, each neuron takes the current I = W s of the spikes s of the substep before, and W_I
-//! phi of the stimuli, which are held for an environment step. Stimuli with an encoder act
-//! through the spikes of its nodes in the same substep instead. `docs/neurons.md` has the models.
+//! substep, each neuron takes the current W s + W_I phi. s are the spikes of the previous substep.
+//! phi are the stimuli, which are constant for an environment step. Stimuli with an encoder act
+//! instead through the spikes of its nodes in the same substep. `docs/neurons.md` has the models.
 //!
 //! The state is computed in f32; constants are computed in f64 and rounded once. All lanes share
 //! the weights, and never interact. The code adds up currents source by source, and skips neurons

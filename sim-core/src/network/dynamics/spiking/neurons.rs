@@ -1,4 +1,4 @@
-//! The neurons of a network, of some model.
+//! The neurons of a network.
 
 use std::marker::PhantomData;
 

@@ -2,9 +2,9 @@
 //! axon, opens receptors of the axon, and these drive a current into every postsynaptic
 //! neuron.
 //!
-//! For each axon: s_ampa = 1 when a spike arrives, else s_ampa -= dt s_ampa / tau; s_gaba
-//! likewise; x = 1 when a spike arrives, else x -= dt x / tau_rise, and then s_nmda += dt (0.5 x
-//! (1 - s_nmda) - s_nmda / tau_decay).
+//! For each axon: s_ampa = 1 when a spike arrives, else s_ampa -= dt s_ampa / tau, and s_gaba by
+//! the same rule; x = 1 when a spike arrives, else x -= dt x / tau_rise, and then s_nmda += dt (0.5
+//! x (1 - s_nmda) - s_nmda / tau_decay).
 //!
 //! For each neuron: I = sum over receptors of gain * (W s) * (E - v), where the term of NMDA is
 //! divided by 1 + Mg2 exp(-0.062 v) / 3.57. Without E, the last factor is 1, and -1 for GABA.
@@ -58,7 +58,7 @@ impl Receptors {
         let SynapseParams { ampa, gaba, nmda } = params;
         let drive = |gain: f64, reversal: Option<f64>| (gain as f32, reversal.map(|e| e as f32));
         let left = |tau: f64| (1.0 - dt / tau) as f32;
-        // Without a reversal potential GABA inhibits by its sign.
+        // Without a reversal potential, GABA inhibits by a negative gain.
         let gaba_gain = if gaba.reversal.is_some() { gaba.gain } else { -gaba.gain };
         Self {
             delays: phenotype.delays.iter().map(|&delay| delay as usize).collect(),
@@ -78,9 +78,9 @@ impl Receptors {
         }
     }
 
-    /// Adds the synaptic currents of a substep. `spikes`: of neurons in the previous substep, and
-    /// of nodes of encoders in this one. `states`: of the neurons, `n_variables` each; v comes
-    /// first. `weights`: of plastic synapses, by their number.
+    /// Adds the synaptic currents of a substep. `spikes`: those of neurons in the previous substep,
+    /// and of nodes of encoders in this one. `states`: the variables of the neurons, `n_variables`
+    /// each, v first. `weights`: those of plastic synapses, by their number.
     #[inline(always)]
     pub fn propagate<S: Simd, const W: usize, const PLASTIC: bool>(
         &self,
@@ -160,7 +160,7 @@ impl Receptors {
 }
 
 impl ReceptorState {
-    /// All receptors closed, without spikes on their way.
+    /// The state with all receptors closed, and no spikes on their way.
     pub fn new(n_axons: usize, n_lanes: usize) -> Self {
         let rows = |n: usize| Aligned::new(n * n_axons * n_lanes);
         Self { clock: 0, history: rows(N_SLOTS), open: rows(N_VARIABLES) }

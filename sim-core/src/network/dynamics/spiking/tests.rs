@@ -30,8 +30,8 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
     (network, phenotype)
 }
 
-/// Networks of each model, one with dynamic synapses and one with encoders, too, substep by
-/// substep or in steps of several.
+/// Networks of each model, one with dynamic synapses, and one with encoders, with `time_scale`
+/// substeps per step.
 fn networks(time_scale: u32) -> Vec<(Network, Phenotype)> {
     let networks = MODELS.into_iter().map(|model| {
         let mut config = experiment_a_spiking(model);

@@ -11,7 +11,7 @@ use experiment_file::Neurotransmitter;
 /// Synapses, grouped by their presynaptic or postsynaptic side.
 #[derive(Debug, Clone)]
 pub(crate) struct Wiring {
-    /// Synapses from stimuli, by postsynaptic neuron; a neuron's ascend by their input.
+    /// Synapses from stimuli, by postsynaptic neuron, and then by ascending input.
     pub afferent: Grouped,
     /// Static synapses from spike sources, by presynaptic side: neurons, then nodes of encoders.
     pub outgoing: Grouped,
