@@ -21,7 +21,7 @@ const FIGURES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/figures");
 /// Substeps of the plot of voltage over time. The current is on in some of them.
 const N_SUBSTEPS: usize = 500;
 const ON: std::ops::Range<usize> = 50..400;
-/// Number of currents of a curve, and of the substeps in which spikes are counted.
+/// Number of currents of a curve, and of substeps that count spikes.
 const N_POINTS: usize = 160;
 const COUNTED: std::ops::Range<usize> = 500..2_500;
 

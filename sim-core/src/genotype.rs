@@ -309,8 +309,7 @@ mod tests {
             codec.uncovered()[0],
             format!("synapses:weights:H1-H1: {n} weights stay random")
         );
-        // Bias and gain evolve in no neuron, which is a choice. tau evolves in one of five
-        // ensembles.
+        // Bias and gain evolve in no neuron, by choice. tau evolves in one of five ensembles.
         assert_eq!(codec.uncovered().len(), 11 + 4);
         assert!(codec.uncovered().contains(&"neurons:tau:OUT_LED stays 2".to_owned()));
         config.topology.motor_tau = Some(0.5);

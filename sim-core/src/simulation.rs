@@ -114,7 +114,7 @@ impl Simulation {
         {
             problems.add(
                 script::PATH,
-                "has no function `fitness` or `final`, but `algorithm.fitness_function` names no other one",
+                "has no function `fitness` or `final`, but `algorithm.fitness_function` names no built-in function",
             );
         }
         if let (Some(task), Some(script), Some(world)) = (&config.task, &script, &world) {
@@ -231,8 +231,8 @@ impl Simulation {
 
     /// As [`evaluate_while`](Self::evaluate_while), but also measures every step. Returns
     /// [`values_per_trial`](Self::values_per_trial) numbers for each trial, one trial after the
-    /// other: its fitness, with the same bits, and then step by step the value of every measure in
-    /// [`measure_names`](Self::measure_names); NaN where a measure has no value.
+    /// other. The first number is the fitness, bit for bit. The others are, step by step, the values
+    /// of the measures in [`measure_names`](Self::measure_names), NaN where a measure has none.
     ///
     /// # Errors
     ///

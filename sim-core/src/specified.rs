@@ -1,5 +1,5 @@
-//! Simulates an experiment from the text of its specification, in which processes send it to each
-//! other. The result is numbers or a failure message.
+//! Simulates an experiment from the text of its specification, the form in which processes
+//! exchange experiments. The result is numbers or a failure message.
 //!
 //! The simulation is deterministic, and so are its failures: every process that computes an item
 //! with this module returns the same message, to the byte.

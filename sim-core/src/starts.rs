@@ -1,4 +1,4 @@
-//! Tries whether the world has room for its objects, which their sizes alone do not show.
+//! Tries whether the world has room for its objects: their sizes alone do not show it.
 
 use std::time::Duration;
 

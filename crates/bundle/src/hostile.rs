@@ -183,7 +183,7 @@ fn no_bundle_takes_more_memory_than_a_few_times_its_content() {
     let path = env::temp_dir().join(format!("swarm-hostile-{}.zip", std::process::id()));
     for (name, bytes) in cases() {
         fs::write(&path, &bytes).unwrap();
-        let test = "hostile::no_bundle_takes_more_memory_than_a_few_times_what_is_in_it";
+        let test = "hostile::no_bundle_takes_more_memory_than_a_few_times_its_content";
         let child = Command::new(env::current_exe().unwrap())
             .args(["--exact", test, "--nocapture"])
             .env(VARIABLE, &path)

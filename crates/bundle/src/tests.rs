@@ -176,7 +176,7 @@ fn a_bundle_reads_back_and_everything_in_it_is_proven() {
     assert_eq!(champion_json(&proof.champion.unwrap()), bundle().champion_json);
     let (claim, last) = proof.proven.last().unwrap();
     assert_eq!(*claim, Claim::Simulation);
-    // Generations, and re-evaluations of a mean, a challenger and, once, a champion.
+    // Re-evaluations of candidates follow the episodes of generations.
     let (_, simulated_again) = last.split_once("simulated again: ").unwrap();
     let n_episodes: usize = simulated_again.split(' ').next().unwrap().parse().unwrap();
     assert!(n_episodes > 4 * 4 * 2 + 4, "{last}");
@@ -223,7 +223,7 @@ fn flipped_bits_are_found_even_if_the_description_is_updated() {
 }
 
 #[test]
-fn flipped_bits_of_the_archive_itself_are_found_or_without_effect() {
+fn flipped_bits_of_the_archive_itself_are_found_or_change_nothing() {
     let bytes = bundle().to_bytes().unwrap();
     let n_bits = bytes.len() * 8;
     let mut n_found = 0;

@@ -62,8 +62,7 @@ fn variants() -> Vec<(String, Params)> {
     .into()
 }
 
-/// The distance from the maximum, of the champion and, if the algorithm has one, of the
-/// distribution's mean.
+/// Distances from the maximum: the champion's and, if the algorithm has a distribution, its mean's.
 fn run(setup: &Setup, function: Function, n_evaluations: u32) -> (f64, Option<f64>) {
     let of_genes = |genes: &[f64]| {
         let x: Vec<f64> = genes.iter().map(|gene| 10.0 * gene - 5.0).collect();

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_are_the_means_of_that_likelihood() {
+    fn both_ends_have_the_likelihood_of_the_quantile() {
         for values in [rarely_fails(), vec![0.0, 1.0, 5.0, 2.0, 2.0, 7.0]] {
             let (low, high) = ends(&values);
             for end in [low, high] {
@@ -169,7 +169,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn scaling_keeps_every_bit_of_ends_that_are_numbers_without_it(
+        fn scaling_changes_no_bit_of_finite_ends(
             values in prop::collection::vec(-1e9f64..1e9, 1..60),
             exponent in -600i32..600,
             offset in -1e12f64..1e12,

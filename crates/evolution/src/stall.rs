@@ -97,7 +97,7 @@ impl Evolution {
         self.n_flat.0
     }
 
-    /// Sets the number of latest generations without a difference, which restored states lack.
+    /// Sets the number of latest generations without a difference: restored states lack it.
     #[must_use]
     pub fn after_flat(self, n_generations: u64) -> Self {
         Self { n_flat: FlatGenerations(n_generations), ..self }

@@ -1,4 +1,4 @@
-//! Means and deviations of fitness, which are finite for finite values, however large.
+//! Means and deviations of fitness: finite for finite values, however large.
 
 use super::{Real, mean};
 
@@ -115,7 +115,7 @@ pub(crate) mod tests {
         }
 
         #[test]
-        fn statistics_that_are_finite_without_scaling_keep_every_bit(
+        fn scaling_changes_no_bit_of_finite_statistics(
             values in prop::collection::vec(any_finite(), 1..40),
         ) {
             let Statistics { mean, standard_deviation, .. } = Statistics::from_fitness(&values);

@@ -97,7 +97,7 @@ pub const TARGETS: usize = 1_000;
 pub const NETWORK_STATES: u64 = 10_000_000;
 /// Robots x steps: the random draws of an episode.
 pub const ROBOT_STEPS: u64 = 20_000_000;
-/// Elementary operations of an episode: for every step and robot, one per
-/// synapse and neuron and network substep, one per robot or light and sector,
-/// and one per lattice point.
+/// Elementary operations of an episode. Every step of a robot has one per synapse and substep of
+/// the network, one per neuron and substep, one per sector and robot or light, and one per lattice
+/// point.
 pub const EPISODE_OPERATIONS: u64 = 1_000_000_000_000;

@@ -290,8 +290,8 @@ parameters! {
     }
 }
 
-/// The robot whose sector the reading `wireless_receiver:sending_direction` gives. The two variants
-/// differ for relayed frames.
+/// Whose sector `wireless_receiver:sending_direction` reads. The two variants differ for relayed
+/// frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SendingDirection {

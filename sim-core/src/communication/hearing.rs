@@ -401,7 +401,7 @@ mod tests {
     }
 
     impl Scene {
-        /// The group of a robot, and its strongest emitters.
+        /// The group of a robot, and the robot's strongest emitters.
         fn heard_by(&self, robot: usize) -> (&Listeners, &[Heard]) {
             let kinds = self.hearing.listeners().iter();
             let mut robots =

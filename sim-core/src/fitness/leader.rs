@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn changing_several_and_no_leaders_earn_nothing() {
+    fn a_leader_that_changes_several_leaders_and_no_leader_earn_nothing() {
         assert_eq!(mean((0..50).map(|k| [k % 2, (k + 1) % 2, 0])), 0.0);
         assert_eq!(mean((0..50).map(|_| [1, 1, 0])), 0.0);
         assert_eq!(mean((0..50).map(|_| [0, 0, 0])), 0.0);

@@ -115,8 +115,8 @@ impl ParameterCoverage {
         }
     }
 
-    /// Describes the parameters that are not covered. Omits parameters that the experiment declares
-    /// untrainable, and parameters that evolve in no neuron, which is a choice.
+    /// Describes the parameters that are not covered. Omits what the file leaves out by choice:
+    /// parameters that it declares untrainable, and parameters that evolve in no neuron.
     pub fn describe(&self, config: &TopologyConfig, network: &Network) -> Vec<String> {
         let mut lines = Vec::new();
         for (name, group) in network.groups.iter().filter(|(_, group)| group.trainable) {

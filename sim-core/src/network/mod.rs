@@ -48,8 +48,8 @@ pub(crate) struct Network {
     pub groups: IndexMap<String, SynapseGroup>,
     /// All synapses, group by group.
     pub synapses: Vec<Synapse>,
-    /// The order of computation, made on first use: programs that only check experiments do not
-    /// need it, and it may have a million synapses.
+    /// The order of computation, made on first use: it may have a million synapses, and programs
+    /// that only check experiments do not need it.
     wiring: OnceLock<Wiring>,
     /// Outputs, in the order of the configuration.
     pub outputs: Vec<Output>,

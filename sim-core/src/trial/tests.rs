@@ -135,7 +135,7 @@ fn robots_may_be_heard_from_the_first_step_on_and_send_for_longer() {
 }
 
 #[test]
-fn readings_without_a_frame_are_zero_and_the_state_is_the_mode() {
+fn receivers_without_a_frame_read_zero_and_their_own_mode() {
     let mut config = line(2);
     observe_sending_direction(&mut config);
     let simulation = Simulation::compile(&config).unwrap();

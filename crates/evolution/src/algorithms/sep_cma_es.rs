@@ -91,8 +91,8 @@ impl Strategy for SepCmaEs {
         Some(self.genotype(&self.deviations(), &draw_normal(index, self.mean.len(), rng)))
     }
 
-    /// As CMA-ES with the better half as parents (Eq. 41 to 47 of its tutorial), with only the
-    /// diagonal of C, y = C^(1/2) z.
+    /// As CMA-ES (Eq. 41 to 47 of its tutorial), but only the better half are parents, and C is
+    /// diagonal: y = C^(1/2) z.
     fn learn(&mut self, sample: &Sample, ranking: &[usize], _fitness: &[f64]) {
         let d = self.mean.len();
         let (weights, rates) = weights_and_rates(d, ranking.len());

@@ -31,7 +31,7 @@ fn bred(crossover: &str, n_generations: u64) -> (Vec<Population>, Pedigree) {
 }
 
 #[test]
-fn genes_are_from_the_parents_that_are_named() {
+fn genes_come_from_the_named_parents() {
     for crossover in ["uniform", "onepoint", "multipoint", "blxalpha", "simulated_binary"] {
         let (genotypes, pedigree) = bred(crossover, 6);
         for individual in 0..15 {
@@ -67,7 +67,7 @@ fn genes_are_from_the_parents_that_are_named() {
 }
 
 #[test]
-fn families_have_the_parents_of_the_pedigree_and_the_fitness_of_both() {
+fn families_have_parents_of_the_pedigree_with_fitness_of_parent_and_child() {
     let setup = Setup { population_size: 15, params: params("uniform"), ..Setup::new("GA", D) };
     let mut evolution = setup.start().unwrap();
     let mut pedigree = Pedigree::starting_at(0);

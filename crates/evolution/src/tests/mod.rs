@@ -318,7 +318,7 @@ fn the_formats_of_keyframes_and_of_the_log_stay() {
 
 /// Older versions wrote NaN as an interval where sums overflowed.
 #[test]
-fn a_state_of_an_older_version_whose_interval_is_nan_opens() {
+fn older_states_with_a_nan_interval_open() {
     let mut evolution = evolution(3, &[2]);
     step(&mut evolution);
     let mut round = evolution.reevaluation().unwrap();

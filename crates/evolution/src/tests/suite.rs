@@ -157,7 +157,7 @@ fn an_individual_drawn_alone_has_the_bits_of_its_generation() {
 }
 
 #[test]
-fn every_generation_has_all_its_individuals_and_new_ones() {
+fn every_generation_is_complete_and_new() {
     for variant in all() {
         for population_size in [4, 11] {
             let mut evolution = start(&variant, &[5], population_size);

@@ -103,8 +103,8 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// Reports a conflict of `path` with `others`, unless one of these places is broken, which
-    /// may be the cause.
+    /// Reports a conflict of `path` with `others`, unless one of these places is broken and may be
+    /// the cause.
     pub(crate) fn conflict(&self, path: &Path, others: &[&Path], message: impl Message) {
         let follows = {
             let remarks = self.remarks.borrow();

@@ -36,7 +36,7 @@ fn generated_files_are_accepted_and_their_canonical_forms_mean_the_same() {
 }
 
 #[test]
-fn damaged_files_are_refused_or_read_to_a_valid_experiment() {
+fn damaged_files_are_refused_or_give_a_valid_experiment() {
     let n_accepted: u64 = thread::scope(|scope| {
         let halves = [0, 1].map(|half| {
             scope.spawn(move || (half..n_files()).step_by(2).map(n_accepted_variants).sum::<u64>())

@@ -26,7 +26,7 @@ fn original(edits: &[(&str, &str)]) -> ExperimentConfig {
 }
 
 #[test]
-fn the_semantics_of_the_original_are_other_defaults() {
+fn semantics_of_the_original_change_defaults() {
     let config = original(&[]);
     let topology = &config.topology;
     assert!(!topology.bias_in_gain);

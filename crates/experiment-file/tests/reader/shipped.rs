@@ -44,7 +44,7 @@ fn shipped_files_are_accepted_without_warnings_under_their_own_names() {
 /// Three tasks are shipped with two spiking neuron models each. Trials and population are those of
 /// the file with rate neurons.
 #[test]
-fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
+fn spiking_files_differ_from_rate_files_in_the_neurons_only() {
     let rate = shipped();
     let spiking = spiking();
     for task in ["leader_selection", "borderline", "light_follower"] {

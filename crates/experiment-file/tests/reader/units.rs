@@ -8,8 +8,7 @@ fn warnings(text: &str) -> Vec<String> {
     warnings.iter().map(ToString::to_string).collect()
 }
 
-/// Asserts that [`BASE`] with one passage replaced has one warning, at this place, which names
-/// this unit.
+/// Asserts that [`BASE`] with one passage replaced has one warning: at this place, about this unit.
 fn doubted(from: &str, to: &str, path: &str, likely: &str) {
     let warnings = warnings(&edited(from, to));
     let [warning] = &warnings[..] else { panic!("{to}: {warnings:#?}") };

@@ -44,7 +44,7 @@ fn said(config: &ExperimentConfig, robot: usize) -> Vec<[f64; 2]> {
 const FITNESS: &str = "\ndef fitness(world):\n    return 1\n";
 
 #[test]
-fn networks_get_the_result_of_sense_in_the_same_step_within_the_range_of_the_sensor() {
+fn the_clamped_result_of_sense_reaches_networks_in_the_same_step() {
     let text = "def sense(robot):\n    return (robot.id / 4 - robot.world.step, robot.id >= 2)";
     let config = sensing(&format!("{text}{FITNESS}"), 3);
     assert_eq!(said(&config, 1), [[0.25, 0.0], [-0.75, 0.0], [-1.0, 0.0]]);
@@ -192,7 +192,7 @@ fn errors_name_their_place_reason_and_object() {
 }
 
 #[test]
-fn a_script_sensor_needs_sense_which_is_otherwise_an_ordinary_name() {
+fn only_a_script_sensor_gives_the_name_sense_a_meaning() {
     let error = Simulation::compile(&sensing(FITNESS, 10)).unwrap_err().to_string();
     assert!(error.contains("t.star: has no function `sense`, but `world.objects.robotA.sensors.script_sensor` leaves"), "{error}");
     let helper = "def sense(robot, factor):\n    return factor * robot.x";

@@ -18,8 +18,8 @@ pub enum Selection {
     LinearRank,
     /// Geometric in rank (Michalewicz 1992), with ratio 0.9.
     NonlinearRank,
-    /// Proportional to fitness, evenly spaced draws with one random offset (Baker 1987): each
-    /// number of draws differs from its expectation by less than one.
+    /// Proportional to fitness, evenly spaced draws with one random offset (Baker 1987). Every
+    /// individual is drawn as often as expected, up to less than one draw.
     StochasticUniversal,
 }
 
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn stochastic_universal_draws_everyone_within_one_of_the_expectation() {
+    fn stochastic_universal_differs_from_expectation_by_less_than_one() {
         let n = 37;
         let mut rng = rng();
         let mut offsets_matter = false;

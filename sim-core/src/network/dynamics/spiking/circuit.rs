@@ -36,7 +36,7 @@ pub(super) struct Circuit {
 #[derive(Debug)]
 pub(super) struct Weighted {
     groups: Vec<Range<usize>>,
-    /// The other side of each synapse, which differs within the group, and its weight.
+    /// Of each synapse, the side that its group does not share, and the weight.
     members: Vec<(usize, f32)>,
     /// The number of each synapse.
     numbers: Vec<usize>,

@@ -78,8 +78,8 @@ impl Receptors {
         }
     }
 
-    /// Adds the synaptic currents of a substep. `spikes`: those of neurons in the previous substep,
-    /// and of nodes of encoders in this one. `states`: the variables of the neurons, `n_variables`
+    /// Adds the synaptic currents of a substep. `spikes`: of neurons in the previous substep, and of
+    /// nodes of encoders in this substep. `states`: the variables of the neurons, `n_variables`
     /// each, v first. `weights`: those of plastic synapses, by their number.
     #[inline(always)]
     pub fn propagate<S: Simd, const W: usize, const PLASTIC: bool>(

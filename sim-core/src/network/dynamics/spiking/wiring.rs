@@ -40,8 +40,8 @@ pub(crate) struct Grouped {
 /// A synapse in its group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Member {
-    /// The other side, which differs within the group: an input or a neuron; numbers after the
-    /// last neuron are nodes of encoders.
+    /// The side that the group does not share: an input or a neuron; numbers after the last neuron
+    /// are nodes of encoders.
     pub other: usize,
     /// Number of the synapse.
     pub synapse: usize,
