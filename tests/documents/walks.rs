@@ -118,18 +118,24 @@ impl Normaliser {
     /// Whether lines of a page consist of the whole output and of any of the remarks, in their
     /// order.
     fn agree(&self, shown: &[String], output: &[String], remarks: &[String]) -> bool {
-        let Some((line, rest)) = shown.split_first() else { return output.is_empty() };
-        if line.trim() == ANY_LINES {
-            return (0..=output.len()).any(|n| self.agree(rest, &output[n..], remarks));
-        }
-        let line = self.apply(line);
-        let is_next = output.first().is_some_and(|first| self.apply(first) == line);
-        if is_next && self.agree(rest, &output[1..], remarks) {
-            return true;
-        }
-        let remark = remarks.iter().position(|remark| self.apply(remark) == line);
-        remark.is_some_and(|at| self.agree(rest, output, &remarks[at + 1..]))
+        let apply = |lines: &[String]| -> Vec<String> {
+            lines.iter().map(|line| self.apply(line)).collect()
+        };
+        consist(&apply(shown), &apply(output), &apply(remarks))
     }
+}
+
+/// [`Normaliser::agree`] for lines that are normalised.
+fn consist(shown: &[String], output: &[String], remarks: &[String]) -> bool {
+    let Some((line, rest)) = shown.split_first() else { return output.is_empty() };
+    if line == ANY_LINES {
+        return (0..=output.len()).any(|n| consist(rest, &output[n..], remarks));
+    }
+    if output.first() == Some(line) && consist(rest, &output[1..], remarks) {
+        return true;
+    }
+    let remark = remarks.iter().position(|remark| remark == line);
+    remark.is_some_and(|at| consist(rest, output, &remarks[at + 1..]))
 }
 
 /// An output in the form of the page: it keeps as many lines before and after `...` as the page.
