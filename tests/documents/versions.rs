@@ -1,6 +1,6 @@
 //! All files name the same version of Rust, with which CI compiles.
 
-use std::fs;
+use std::{collections::BTreeMap, fs};
 
 use harness::workspace_file;
 
@@ -55,4 +55,37 @@ fn images_are_built_from_every_crate_of_the_workspace() {
         .filter(|member| !context.lines().any(|line| line.strip_prefix('!') == Some(*member)))
         .collect();
     assert!(missing.is_empty(), ".dockerignore leaves out {missing:?}");
+}
+
+/// One target directory then has them once for tests and for the Python package.
+#[test]
+fn other_people_s_crates_have_one_development_profile_in_both_workspaces() {
+    let read = |path: &str| fs::read_to_string(workspace_file(path)).unwrap();
+    let (manifest, lock) = (read("Cargo.toml"), read("python/Cargo.lock"));
+    let is_shared = |name: &str| {
+        let is_it = |package: &str| {
+            package.contains(&format!("name = \"{name}\"\n")) && package.contains("\nsource = ")
+        };
+        name == "\"*\"" || lock.split("[[package]]").any(is_it)
+    };
+    let here: BTreeMap<String, String> = manifest
+        .split("\n[profile.dev.package.")
+        .skip(1)
+        .map(|section| section.split_once("]\n").expect("a name"))
+        .filter(|(name, _)| is_shared(name))
+        .map(|(name, rest)| {
+            let is_setting = |line: &&str| line.contains(" = ") && !line.starts_with('#');
+            let settings: Vec<&str> = rest.lines().take_while(is_setting).collect();
+            (name.to_owned(), settings.join(", "))
+        })
+        .collect();
+    let there = between("python/Cargo.toml", "\n[profile.dev.package]\n", "\n[");
+    let there: BTreeMap<String, String> = there
+        .lines()
+        .filter_map(|line| line.strip_suffix(" }")?.split_once(" = { "))
+        .filter(|(name, _)| is_shared(name))
+        .map(|(name, settings)| (name.to_owned(), settings.to_owned()))
+        .collect();
+    assert!(here.len() > 5, "{here:?}");
+    assert_eq!(there, here);
 }
