@@ -113,6 +113,7 @@ impl World {
                 ObjectConfig::Robot(_) => {}
                 ObjectConfig::LightSource(light) => world.add_lights(index, name, light, problems),
                 ObjectConfig::GroundArea(area) => world.add_areas(index, name, area, problems),
+                ObjectConfig::Wall(_) | ObjectConfig::Obstacle(_) | ObjectConfig::Movable(_) => {}
             }
         }
         let mut evolvable = None;

@@ -55,7 +55,7 @@ fn scripts() -> Vec<(String, ExperimentConfig)> {
                 ObjectConfig::LightSource(light) => {
                     light.controller = LightController::ScriptController {};
                 }
-                ObjectConfig::GroundArea(_) => {}
+                _ => {}
             }
         }
         scripts.push((format!("{text}\n{moves}\n{ACTS}"), config));

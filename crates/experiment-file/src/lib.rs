@@ -62,10 +62,12 @@
 
 mod actuators;
 mod algorithm;
+mod bodies;
 mod check;
 mod description;
 mod encoding;
 mod fitness;
+mod geometry;
 mod learning;
 pub mod limits;
 mod neuron;
@@ -88,6 +90,7 @@ mod world;
 
 pub use actuators::*;
 pub use algorithm::*;
+pub use bodies::*;
 pub use description::{AlgorithmDescription, Keeps, LearnsFrom};
 pub use encoding::*;
 pub use fitness::*;

@@ -80,7 +80,19 @@ pub const SYNAPSES: u64 = 1_000_000;
 pub const ROBOTS: u32 = 10_000;
 /// Lights and ground areas, of all objects together.
 pub const STATIC_OBJECTS: u32 = 1_000;
-/// Sectors of a sensor.
+/// Walls, obstacles and movables, of all objects together.
+pub const OBSTACLES: u32 = 1_000;
+/// Corners of a polygon or of a line of walls.
+pub const CORNERS: usize = 64;
+/// Corners of a movable.
+pub const MOVABLE_CORNERS: usize = 16;
+/// Radii of bodies, cm.
+pub const BODY_RADII: RangeInclusive<f64> = 0.1..=10_000.0;
+/// Masses of bodies, kg.
+pub const MASSES: RangeInclusive<f64> = 0.001..=1_000.0;
+/// Physics substeps per environment step.
+pub const SUBSTEPS: u32 = 64;
+/// Sectors of a sensor, and rays of one.
 pub const SECTORS: u32 = 360;
 /// Components of a message.
 pub const MESSAGE_LENGTH: u32 = 64;

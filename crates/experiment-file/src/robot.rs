@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ActuatorsConfig, Initializer, SensorQuery, SensorsConfig, limits, schema};
+use super::{ActuatorsConfig, BodyConfig, Initializer, SensorQuery, SensorsConfig, limits, schema};
 use crate::DefaultValue::{Depends, Name, Null, Number, Numbers, Whole};
 use crate::parameters::{Variants, parameters};
 use crate::{Domain, ParameterValue};
@@ -12,7 +12,7 @@ use crate::{Domain, ParameterValue};
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("sensors, actuators, perturbations, params"),
+    transform = schema::optional("sensors, actuators, body, perturbations, params"),
     transform = schema::ignored("positions, orientations")
 )]
 pub struct RobotConfig {
@@ -25,7 +25,11 @@ pub struct RobotConfig {
     pub sensors: SensorsConfig,
     /// What they can do.
     pub actuators: ActuatorsConfig,
-    /// Start positions and headings.
+    /// Their bodies, in a world with `bodies`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "BodyConfig")]
+    pub body: Option<BodyConfig>,
+    /// Where they start.
     pub initializers: RobotInitializers,
     /// Faults and disturbances.
     pub perturbations: PerturbationsConfig,

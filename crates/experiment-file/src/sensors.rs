@@ -8,9 +8,9 @@ use std::f64::consts::PI;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::DefaultValue::{Name, Number, Required, Whole};
+use crate::DefaultValue::{Name, Null, Number, Required, Whole};
 use crate::parameters::{Also, parameters, variants};
-use crate::{Domain, limits};
+use crate::{BlockedBy, Domain, SEES, Sees, limits};
 
 /// Sensors of SpikeSwarmSim that this simulator lacks.
 pub(crate) const UNSUPPORTED: [&str; 1] = ["neighbors_state_sensor"];
@@ -182,6 +182,16 @@ sensors! { $
         /// The numbers that the function `sense` of the script returns; `n` values.
         "script_sensor" = Script: |sensor| sensor.n,
     }
+    /// How near the robot's body is to others, along rays.
+    proximity_sensor: ProximitySensorConfig, seen: |sensor| sensor.n_rays, {
+        /// Nearness of what each ray meets; `n_rays` values.
+        "proximity_sensor" = Proximity: |sensor| sensor.n_rays,
+    }
+    /// Whether the robot's body touches something.
+    contact_sensor: ContactSensorConfig, seen: |_| 0, {
+        /// 1 per sector in which the body touches something; `n_sectors` values.
+        "contact_sensor" = Contact: |sensor| sensor.n_sectors,
+    }
 }
 
 /// Range of the number of sectors, and of other numbers of values.
@@ -215,6 +225,9 @@ parameters! {
             of(Domain::Variant(SendingDirection::VARIANTS), Name("emitter"))
             .original(Name("originator"))
             .recent(),
+        /// What stops frames on their way to the receiver.
+        blocked_by: BlockedBy =
+            of(Domain::Variant(BlockedBy::VARIANTS), Name("nothing")).recent(),
     }
     ignored { "noise_sigma": "reception has no noise"; }
 
@@ -240,6 +253,9 @@ parameters! {
                 (3.0 * PI / f64::from(params.of_key::<u32>("n_sectors"))).min(PI)
             })
             .recent(),
+        /// What stops light on its way to the sensor.
+        blocked_by: BlockedBy =
+            of(Domain::Variant(BlockedBy::VARIANTS), Name("nothing")).recent(),
     }
 
     /// Sees other robots. The value of a sector is the largest exp(-decay_rho distance - decay_phi
@@ -287,6 +303,30 @@ parameters! {
         low: f64 = quantity(0.0),
         /// Larger numbers become this one.
         high: f64 = quantity(1.0),
+    }
+
+    /// Sees along rays from the robot's rim what its body may run into. A ray reads 1 - distance /
+    /// range of the first thing that it meets, and 0 if there is none within the range.
+    pub struct ProximitySensorConfig: Default {
+        /// Number of rays.
+        n_rays: u32 = whole(SECTORS, 8),
+        /// Reach from the robot's rim, cm.
+        range: f64 = positive(10.0),
+        /// Angle of each ray to the robot's heading, radians.
+        angles: Option<Vec<f64>> = of(Domain::Numbers(1, limits::SECTORS as usize), Null)
+            .null()
+            .shown("null: evenly around the robot, the first one ahead"),
+        /// What the rays meet: `robots`, `walls` with the boundary, `objects`, which are obstacles
+        /// and movables, a list of these, or `all`.
+        sees: Sees = of(Domain::Variant(SEES), Name("all")),
+        /// Standard deviation of the Gaussian noise.
+        noise_sigma: f64 = amount(0.0),
+    }
+
+    /// Feels what the robot's body touches.
+    pub struct ContactSensorConfig: Default {
+        /// Number of sectors around the robot.
+        n_sectors: u32 = whole(SECTORS, 4),
     }
 }
 

@@ -3,25 +3,34 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{NamedMap, RobotConfig, limits, schema};
-use crate::DefaultValue::{Depends, Null, Number, Required};
+use super::{
+    BOUNDARY, BodiesConfig, Boundary, MovableConfig, NamedMap, ObstacleConfig, RobotConfig,
+    WallConfig, limits, schema,
+};
+use crate::DefaultValue::{Depends, Name, Null, Number, Required};
 use crate::parameters::{kinds, parameters};
 use crate::{DefaultValue, Domain};
 
 parameters! {
-    /// A flat torus and its objects.
+    /// The arena and its objects.
     pub struct WorldConfig {
         /// Height H (y axis), cm.
         height: f64 = between([1.0, limits::MAGNITUDE], 1000.0),
         /// Width W (x axis), cm.
         width: f64 = between([1.0, limits::MAGNITUDE], 1000.0),
+        /// What is at the edge: nothing, as on a torus; walls along the rectangle; or walls along
+        /// a simple polygon in it, which this lists the corners `[x, y]` of, cm.
+        boundary: Boundary = of(Domain::Variant(BOUNDARY), Name("torus")).recent(),
+        /// Makes bodies of robots, which then block each other and push movables. Needs a
+        /// `boundary` of walls.
+        bodies: Option<BodiesConfig> = optional(BodiesConfig::OBJECT),
     }
     ignored {
         "world_delay", "render_connections": "it concerns the original simulator's window";
     }
     parts {
-        /// Robots, lights and ground areas, by names that you choose. Their order numbers the
-        /// robots.
+        /// Robots, lights, ground areas, walls, obstacles and movables, by names that you choose.
+        /// Their order numbers the robots.
         objects: NamedMap<ObjectConfig> = required(schema::map::<ObjectConfig>);
     }
 }
@@ -38,6 +47,12 @@ pub enum ObjectConfig {
     LightSource(LightSourceConfig),
     /// Coloured discs on the ground.
     GroundArea(GroundAreaConfig),
+    /// A line of walls, which blocks robots and movables.
+    Wall(WallConfig),
+    /// Discs or polygons that stand in the way.
+    Obstacle(ObstacleConfig),
+    /// Discs or convex polygons that robots push.
+    Movable(MovableConfig),
 }
 
 impl ObjectConfig {
@@ -47,6 +62,9 @@ impl ObjectConfig {
             Self::Robot(robot) => robot.num_instances,
             Self::LightSource(light) => light.num_instances,
             Self::GroundArea(area) => area.num_instances,
+            Self::Wall(_) => 1,
+            Self::Obstacle(obstacle) => obstacle.num_instances,
+            Self::Movable(movable) => movable.num_instances,
         }
     }
 }

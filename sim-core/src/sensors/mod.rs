@@ -4,6 +4,7 @@
 //! A kind of sensor implements [`Sensor`] in the file of its subject. [`mount`] makes a sensor by
 //! the function with the name of the sensor's key in files.
 
+mod bodies;
 mod ground;
 mod light;
 mod own;
@@ -14,7 +15,7 @@ use std::fmt::Debug;
 use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 
-use self::{ground::*, light::*, own::*, robots::*, scripted::*};
+use self::{bodies::*, ground::*, light::*, own::*, robots::*, scripted::*};
 use crate::neighbours::Neighbours;
 use crate::objects::Switches;
 use crate::swarm::Swarm;

@@ -84,6 +84,7 @@ pub fn experiment_d() -> ExperimentConfig {
         decay_phi: 1.0,
         noise_variance: 0.1,
         aperture: PI,
+        blocked_by: BlockedBy::Nothing,
     });
     robots.actuators.led_actuator = None;
     robots.actuators.wheel_actuator = Some(wheels());
@@ -117,7 +118,13 @@ pub fn experiment_d() -> ExperimentConfig {
 }
 
 fn world<const N: usize>(objects: [(&str, ObjectConfig); N]) -> WorldConfig {
-    WorldConfig { height: 1000.0, width: 1000.0, objects: named(objects) }
+    WorldConfig {
+        height: 1000.0,
+        width: 1000.0,
+        boundary: Boundary::Torus,
+        bodies: None,
+        objects: named(objects),
+    }
 }
 
 fn wheels() -> WheelActuatorConfig {
@@ -145,6 +152,7 @@ fn leader_robots() -> RobotConfig {
             wireless_transmitter: Some(transmitter()),
             ..Default::default()
         },
+        body: None,
         initializers: RobotInitializers {
             positions: Initializer::RandomGraph { max_rad: 100.0, initial_pos: [500.0, 500.0] },
             orientations: Initializer::RandomUniform { low: 0.0, high: TAU, size: 1 },
@@ -283,6 +291,7 @@ fn receiver() -> WirelessReceiverConfig {
         decay_rho: 0.05,
         decay_phi: 1.0,
         sending_direction: SendingDirection::Emitter,
+        blocked_by: BlockedBy::Nothing,
     }
 }
 

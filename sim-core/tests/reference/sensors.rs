@@ -52,7 +52,9 @@ impl Readings {
             // Only a script lets robots carry something.
             SensorQuery::Food => vec![0.0],
             SensorQuery::NeighborhoodPos => self.neighborhood.clone(),
-            SensorQuery::Script => panic!("no equation is given"),
+            SensorQuery::Script | SensorQuery::Proximity | SensorQuery::Contact => {
+                panic!("no equation is given")
+            }
         }
     }
 }

@@ -152,6 +152,9 @@ impl<'a> Simulation<'a> {
                         .areas
                         .extend(drawn.into_iter().map(|position| Area { position, params }));
                 }
+                ObjectConfig::Wall(_) | ObjectConfig::Obstacle(_) | ObjectConfig::Movable(_) => {
+                    panic!("no equation is given")
+                }
             }
         }
         simulation

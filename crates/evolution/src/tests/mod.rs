@@ -10,8 +10,8 @@ mod reference;
 mod suite;
 
 use experiment_file::{
-    AlgorithmConfig, AlgorithmDescription, Domain, FitnessFunction, InitialRates, NamedMap,
-    NeuronModel, Params, PopulationConfig, SynapseModel, TopologyConfig, WorldConfig,
+    AlgorithmConfig, AlgorithmDescription, Boundary, Domain, FitnessFunction, InitialRates,
+    NamedMap, NeuronModel, Params, PopulationConfig, SynapseModel, TopologyConfig, WorldConfig,
 };
 
 use super::*;
@@ -256,7 +256,13 @@ fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentC
                 .map(|name| ((*name).to_owned(), population()))
                 .collect(),
         },
-        world: WorldConfig { height: 1000.0, width: 1000.0, objects: NamedMap::new() },
+        world: WorldConfig {
+            height: 1000.0,
+            width: 1000.0,
+            boundary: Boundary::Torus,
+            bodies: None,
+            objects: NamedMap::new(),
+        },
         task: None,
     }
 }

@@ -2,20 +2,20 @@
 
 use crate::report::{Path, Report};
 use crate::{
-    ActuatorQuery, ExperimentConfig, InhibitedStimulus, Initializer, LightController, ObjectConfig,
-    RobotConfig, RobotController, ScriptSensorConfig, SensorQuery, TopologyConfig,
-    WirelessTransmitterConfig, limits,
+    ActuatorQuery, ExperimentConfig, InhibitedStimulus, Initializer, LightController,
+    MovableConfig, ObjectConfig, ObstacleConfig, RobotConfig, RobotController, ScriptSensorConfig,
+    SensorQuery, TopologyConfig, WirelessTransmitterConfig, limits,
 };
 
 pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
     for (name, object) in &config.world.objects {
         let path = Path::from(["world", "objects", name]);
         let positions = path.key("initializers").key("positions");
+        let orientations = path.key("initializers").key("orientations");
         let n = object.num_instances();
         match object {
             ObjectConfig::Robot(robot) => {
                 initializer(&robot.initializers.positions, n, &positions, report);
-                let orientations = path.key("initializers").key("orientations");
                 initializer(&robot.initializers.orientations, n, &orientations, report);
                 match robot.controller {
                     RobotController::NeuralController => {
@@ -43,6 +43,12 @@ pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
                 }
                 initializer(&area.initializers.positions, n, &positions, report);
             }
+            ObjectConfig::Obstacle(ObstacleConfig { initializers, .. })
+            | ObjectConfig::Movable(MovableConfig { initializers, .. }) => {
+                initializer(&initializers.positions, n, &positions, report);
+                initializer(&initializers.orientations, n, &orientations, report);
+            }
+            ObjectConfig::Wall(_) => {}
         }
     }
     messages(config, report);

@@ -17,8 +17,8 @@ use crate::limits;
 
 pub(crate) use kinds::{Choice, bind, kind_table, kinds, kinds_schema, read_kind, serialize_kind};
 pub use kinds::{Kind, Kinds};
-pub(crate) use read::{Keys, defaults, inner, optional, params, read};
-pub(crate) use schema::{add_part, object, properties};
+pub(crate) use read::{Keys, defaults, inner, optional, params, points, read};
+pub(crate) use schema::{add_part, list, object, points_schema, properties};
 pub use typed::{Nested, Parameters, Table, Variants};
 pub(crate) use typed::{key, parameters, variants};
 pub use value::{ParameterValue, Params};
@@ -86,7 +86,9 @@ pub enum Domain {
     /// A list of at most this many lists of numbers. Other parts of the file determine the length
     /// of each.
     Vectors(usize),
-    /// The only whole number that other parts of the file allow.
+    /// A list of so many points `[x, y]`, at least and at most.
+    Points(usize, usize),
+    /// The one whole number that other parts of the file leave.
     Certain,
     /// A name, or a list of them.
     Names,

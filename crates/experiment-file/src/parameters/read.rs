@@ -222,6 +222,11 @@ impl Parameter {
                 let vectors = node.list(1..=max).into_iter().map(|node| numbers(node, n..=n));
                 ParameterValue::Vectors(vectors.collect())
             }
+            Domain::Points(min, max) => {
+                let mut points = points(node, min..=max);
+                points.resize(points.len().max(min), [0.0; 2]);
+                points.into()
+            }
             Domain::Certain => {
                 let n = match own() {
                     Some(&ParameterValue::Whole(n)) => n,
@@ -238,6 +243,12 @@ impl Parameter {
             }
         })
     }
+}
+
+/// Points `[x, y]`.
+pub(crate) fn points(node: Node<'_>, lengths: RangeInclusive<usize>) -> Vec<[f64; 2]> {
+    let point = |node| numbers(node, 2..=2).try_into().unwrap_or_default();
+    node.list(lengths).into_iter().map(point).collect()
 }
 
 fn numbers(node: Node<'_>, lengths: RangeInclusive<usize>) -> Vec<f64> {

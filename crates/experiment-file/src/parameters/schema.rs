@@ -100,6 +100,7 @@ impl Parameter {
             Domain::Numbers(min, max) => list(quantity(), min, max),
             // The lengths depend on other parts of the file.
             Domain::Vectors(max) => list(list(quantity(), 1, 2), 1, max),
+            Domain::Points(min, max) => points_schema(min, max),
             Domain::Certain => whole(0, u32::MAX),
             Domain::Names => schema::names(generator).to_value(),
             Domain::Object(object) => (object.schema)(generator).to_value(),
@@ -135,7 +136,13 @@ fn quantity() -> Value {
     number(-limits::MAGNITUDE, limits::MAGNITUDE)
 }
 
-fn list(items: Value, min: usize, max: usize) -> Value {
+/// Of a list of points `[x, y]`.
+pub(crate) fn points_schema(min: usize, max: usize) -> Value {
+    list(list(quantity(), 2, 2), min, max)
+}
+
+/// Of a list.
+pub(crate) fn list(items: Value, min: usize, max: usize) -> Value {
     json!({"type": "array", "items": items, "minItems": min, "maxItems": max})
 }
 

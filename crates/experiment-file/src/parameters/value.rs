@@ -195,6 +195,23 @@ impl TryFrom<ParameterValue> for [f64; 2] {
     }
 }
 
+impl From<Vec<[f64; 2]>> for ParameterValue {
+    fn from(points: Vec<[f64; 2]>) -> Self {
+        Self::Vectors(points.into_iter().map(Vec::from).collect())
+    }
+}
+
+impl TryFrom<ParameterValue> for Vec<[f64; 2]> {
+    type Error = ParameterValue;
+
+    fn try_from(value: ParameterValue) -> Result<Self, ParameterValue> {
+        let vectors = Vec::<Vec<f64>>::try_from(value)?;
+        let points: Option<Self> =
+            vectors.iter().map(|vector| vector.as_slice().try_into().ok()).collect();
+        points.ok_or(ParameterValue::Vectors(vectors))
+    }
+}
+
 impl<T: Parameters> From<Vec<T>> for ParameterValue {
     fn from(objects: Vec<T>) -> Self {
         Self::Objects(objects.iter().map(T::to_params).collect())

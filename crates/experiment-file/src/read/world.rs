@@ -1,29 +1,59 @@
-//! Reads `world`: the arena, lights, ground areas, start values.
+//! Reads `world`: the arena, lights, ground areas, things in the way, start values.
 
 use super::node::{Node, Object};
 use super::robot::robot;
 use crate::parameters::{self, Choice};
 use crate::semantics::Semantics;
 use crate::{
-    GroundAreaConfig, GroundAreaParams, Initializer, LightController, LightSourceConfig,
-    NamedAreaParams, ObjectConfig, ParameterValue, PositionInitializers, WorldConfig, limits,
+    BodyInitializers, GroundAreaConfig, GroundAreaParams, Initializer, LightController,
+    LightSourceConfig, MovableConfig, NamedAreaParams, ObjectConfig, ObstacleConfig,
+    ParameterValue, PositionInitializers, WorldConfig, limits,
 };
 
 pub(super) fn world(o: &mut Object<'_>, semantics: Semantics) -> WorldConfig {
     let world: WorldConfig = parameters::read(o, semantics, &[]);
     let center = [world.width / 2.0, world.height / 2.0];
-    let objects =
-        o.required("objects").map(1, |_, node| node.object(|o| object(o, center, semantics)));
+    let has_bodies = world.bodies.is_some();
+    let read = |o: &mut Object<'_>| object(o, center, has_bodies, semantics);
+    let objects = o.required("objects").map(1, |_, node| node.object(read));
     WorldConfig { objects, ..world }
 }
 
-fn object(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> ObjectConfig {
-    const KNOWN: [&str; 5] = ["robot", "light_source", "ground_area", "food_area", "nest"];
-    for key in ["positions", "orientations"] {
-        o.ignored(key, "`initializers` determine where objects start");
+fn object(
+    o: &mut Object<'_>,
+    center: [f64; 2],
+    has_bodies: bool,
+    semantics: Semantics,
+) -> ObjectConfig {
+    const KNOWN: [&str; 8] = [
+        "robot",
+        "light_source",
+        "ground_area",
+        "food_area",
+        "nest",
+        "wall",
+        "obstacle",
+        "movable",
+    ];
+    let kind = o.required("type").one_of(&KNOWN, &[]);
+    if !matches!(kind, Some("wall" | "obstacle" | "movable")) {
+        for key in ["positions", "orientations"] {
+            o.ignored(key, "`initializers` say where objects start");
+        }
     }
-    match o.required("type").one_of(&KNOWN, &[]) {
-        Some("robot") => ObjectConfig::Robot(robot(o, center, semantics)),
+    match kind {
+        Some("robot") => ObjectConfig::Robot(robot(o, center, has_bodies, semantics)),
+        Some("wall") => ObjectConfig::Wall(parameters::read(o, semantics, &[])),
+        Some("obstacle") => ObjectConfig::Obstacle(ObstacleConfig {
+            num_instances: o.required("num_instances").u32(1..=limits::OBSTACLES),
+            initializers: body_initializers(o, center),
+            params: parameters::inner(o, "params", semantics, &[]),
+        }),
+        Some("movable") => ObjectConfig::Movable(MovableConfig {
+            num_instances: o.required("num_instances").u32(1..=limits::OBSTACLES),
+            initializers: body_initializers(o, center),
+            params: parameters::inner(o, "params", semantics, &[]),
+        }),
         Some("light_source") => ObjectConfig::LightSource(light_source(o, center, semantics)),
         Some("food_area") => ObjectConfig::GroundArea(ground_area(o, center, Some("green"))),
         Some("nest") => ObjectConfig::GroundArea(ground_area(o, center, Some("black"))),
@@ -86,8 +116,18 @@ fn position_initializers(o: &mut Object<'_>, center: [f64; 2]) -> PositionInitia
     })
 }
 
-/// Reads start positions. `center`: the centre of the world, which is the default centre of
-/// arrangements.
+fn body_initializers(o: &mut Object<'_>, center: [f64; 2]) -> BodyInitializers {
+    o.required("initializers").object(|o| BodyInitializers {
+        positions: positions(o.required("positions"), center),
+        orientations: o
+            .optional("orientations")
+            .map_or(Initializer::Fixed { values: vec![vec![0.0]] }, |node| {
+                orientations(Some(node))
+            }),
+    })
+}
+
+/// Reads start positions. `center`: of the world, the default centre of arrangements.
 pub(super) fn positions(node: Node<'_>, center: [f64; 2]) -> Initializer {
     let choice = Choice::any::<Initializer>(&["grid_graph"]);
     let centers = [("center", center.into()), ("initial_pos", center.into())];

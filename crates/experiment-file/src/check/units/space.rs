@@ -4,7 +4,10 @@ use std::f64::consts::TAU;
 
 use super::{Doubts, step};
 use crate::report::Path;
-use crate::{FitnessParams, Initializer, LightController, ObjectConfig, OrbitConfig, RobotConfig};
+use crate::{
+    FitnessParams, Initializer, LightController, MovableConfig, ObjectConfig, ObstacleConfig,
+    OrbitConfig, RobotConfig,
+};
 
 /// Range of plausible sides of a world for robots of some centimetres, cm.
 const SIDE_MIN: f64 = 20.0;
@@ -41,11 +44,11 @@ pub(super) fn check(doubts: &Doubts<'_>) {
     for (name, object) in &world.objects {
         let path = Path::from(["world", "objects", name]);
         let positions = path.key("initializers").key("positions").key("params");
+        let orientations = path.key("initializers").key("orientations").key("params");
         match object {
             ObjectConfig::Robot(robot) => {
                 at(&robot.initializers.positions, &positions, doubts);
                 crowd(robot, &positions, doubts);
-                let orientations = path.key("initializers").key("orientations").key("params");
                 headings(&robot.initializers.orientations, &orientations, doubts);
                 self::robot(robot, &path, doubts);
             }
@@ -59,6 +62,12 @@ pub(super) fn check(doubts: &Doubts<'_>) {
                 let step = doubts.longest_step();
                 reach(area.params.range, step, &path.key("params").key("range"), doubts);
             }
+            ObjectConfig::Obstacle(ObstacleConfig { initializers, .. })
+            | ObjectConfig::Movable(MovableConfig { initializers, .. }) => {
+                at(&initializers.positions, &positions, doubts);
+                headings(&initializers.orientations, &orientations, doubts);
+            }
+            ObjectConfig::Wall(_) => {}
         }
     }
     let params = &doubts.config.algorithm.fitness_params;
