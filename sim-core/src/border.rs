@@ -63,7 +63,7 @@ mod tests {
     use determinism::random::{Purpose, Stream};
     use experiment_file::Initializer;
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
+    const TORUS: Torus = Torus::new(1000.0, 1000.0);
 
     fn border(positions: &[(f64, f64)]) -> Vec<bool> {
         let positions: Vec<Vec2> =

@@ -14,6 +14,13 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
+    /// Speed, cm/s, and rate of turning, rad/s, for these actions of the right and left wheel, in
+    /// \[-1, 1\].
+    pub fn asks(&self, wheels: [f64; 2]) -> (f64, f64) {
+        let [right, left] = wheels.map(|action| action * self.max_speed);
+        (0.5 * (right + left), (right - left) / self.axle_length)
+    }
+
     /// The pose after one step with these actions of the right and left wheel, in \[-1, 1\].
     pub fn advance(
         &self,
@@ -22,10 +29,8 @@ impl Drive {
         heading: f64,
         wheels: [f64; 2],
     ) -> (Vec2, f64) {
-        let [right, left] = wheels.map(|action| action * self.max_speed);
-        let speed = 0.5 * (right + left);
-        let turn = (right - left) / self.axle_length;
-        let turn = turn * self.step_duration;
+        let (speed, turning) = self.asks(wheels);
+        let turn = turning * self.step_duration;
         // The chord of the arc: 2 r sin(turn / 2), with r = length / turn, in the
         // direction half-way between the headings.
         let length = speed * self.step_duration;
@@ -51,7 +56,7 @@ mod tests {
 
     use super::*;
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
+    const TORUS: Torus = Torus::new(1000.0, 1000.0);
     const DRIVE: Drive = Drive { max_speed: 10.0, axle_length: 11.0, step_duration: 0.33 };
 
     fn assert_pose(actual: (Vec2, f64), (x, y, heading): (f64, f64, f64)) {

@@ -72,6 +72,7 @@
 mod alpha_shape;
 #[doc(hidden)]
 pub mod bench;
+mod bodies;
 mod border;
 mod communication;
 mod controllers;

@@ -149,7 +149,7 @@ mod tests {
     use super::*;
     use determinism::random::Purpose;
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 800.0 };
+    const TORUS: Torus = Torus::new(1000.0, 800.0);
 
     fn path(controller: LightController, start: Vec2) -> impl FnMut(u32) -> Vec2 {
         let stream = Stream::new(0, 0, 0, Purpose::LightMovement, 0);

@@ -109,6 +109,25 @@ impl Neighbours {
         &self.found.rho[places]
     }
 
+    /// Keeps those neighbours of each robot for which `keep` is true.
+    pub fn retain(&mut self, mut keep: impl FnMut(usize, Neighbour) -> bool) {
+        let n_robots = self.found.first.len() - 1;
+        let mut kept = 0;
+        for robot in 0..n_robots {
+            let places = self.places(robot);
+            self.found.first[robot] = kept;
+            for place in places {
+                if keep(robot, self.get(place)) {
+                    let Found { robots, rho, bearing, .. } = &mut self.found;
+                    robots[kept] = robots[place];
+                    (rho[kept], bearing[kept]) = (rho[place], bearing[place]);
+                    kept += 1;
+                }
+            }
+        }
+        self.found.first[n_robots] = kept;
+    }
+
     /// Finds the neighbours of all robots.
     pub fn update(&mut self, torus: &Torus, positions: &[Vec2]) {
         if self.reach == 0.0 {
@@ -394,7 +413,7 @@ mod tests {
 
     use super::*;
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 600.0 };
+    const TORUS: Torus = Torus::new(1000.0, 600.0);
 
     fn neighbours(positions: &[Vec2], reach: f64) -> Neighbours {
         let mut neighbours = Neighbours::new(reach, positions.len());

@@ -1,6 +1,7 @@
 //! Positions, displacements and angles on the flat torus.
 
 use std::f64::consts::TAU;
+use std::ops::{Add, Mul, Neg, Sub};
 
 use serde::Serialize;
 
@@ -36,6 +37,74 @@ impl Vec2 {
     /// Signed angle in \[0, 2 pi); 0 for the zero vector.
     pub(crate) fn angle(self) -> f64 {
         polar::angle(self.x, self.y)
+    }
+
+    /// Scalar product.
+    pub(crate) fn dot(self, other: Self) -> f64 {
+        self.x * other.x + self.y * other.y
+    }
+
+    /// The third component of the vector product.
+    pub(crate) fn cross(self, other: Self) -> f64 {
+        self.x * other.y - self.y * other.x
+    }
+
+    /// Turned by the angle whose (cos, sin) is `axis`.
+    pub(crate) fn rotated(self, axis: Self) -> Self {
+        Self { x: axis.x * self.x - axis.y * self.y, y: axis.y * self.x + axis.x * self.y }
+    }
+
+    /// Turned back by that angle.
+    pub(crate) fn unrotated(self, axis: Self) -> Self {
+        self.rotated(Self { x: axis.x, y: -axis.y })
+    }
+
+    /// Turned by a quarter, counter-clockwise.
+    pub(crate) fn turned_left(self) -> Self {
+        Self { x: -self.y, y: self.x }
+    }
+
+    /// Turned by a quarter, clockwise.
+    pub(crate) fn turned_right(self) -> Self {
+        Self { x: self.y, y: -self.x }
+    }
+
+    /// The unit vector in this direction; zero of the zero vector.
+    pub(crate) fn unit_or_zero(self) -> Self {
+        let norm = self.norm();
+        if norm > 0.0 { self * (1.0 / norm) } else { Self::default() }
+    }
+}
+
+impl Add for Vec2 {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { x: self.x + other.x, y: self.y + other.y }
+    }
+}
+
+impl Sub for Vec2 {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self { x: self.x - other.x, y: self.y - other.y }
+    }
+}
+
+impl Neg for Vec2 {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self { x: -self.x, y: -self.y }
+    }
+}
+
+impl Mul<f64> for Vec2 {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self { x: self.x * factor, y: self.y * factor }
     }
 }
 
@@ -73,30 +142,47 @@ fn wrap(x: f64, period: f64) -> f64 {
     if rest < period { rest } else { 0.0 }
 }
 
-/// A flat torus: objects that leave on one side enter on the opposite side.
+/// The world's plane: a flat torus, where objects that leave on one side enter on the opposite
+/// side, or a plane without that seam, for a world between walls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Torus {
-    /// Period along x, cm.
+    /// Extent of the world along x, cm.
     pub width: f64,
-    /// Period along y, cm.
+    /// Extent of the world along y, cm.
     pub height: f64,
+    /// Periods along x and y, cm; infinite without a seam.
+    period: Vec2,
 }
 
 impl Torus {
+    /// A torus of this extent.
+    pub const fn new(width: f64, height: f64) -> Self {
+        Self { width, height, period: Vec2::new(width, height) }
+    }
+
+    /// A plane without a seam, of which the world has this extent.
+    pub const fn walled(width: f64, height: f64) -> Self {
+        Self { width, height, period: Vec2::new(f64::INFINITY, f64::INFINITY) }
+    }
+
     /// The middle of the world (W/2, H/2).
     pub fn center(&self) -> Vec2 {
         Vec2 { x: 0.5 * self.width, y: 0.5 * self.height }
     }
 
-    /// The same position with coordinates in \[0, width) x \[0, height).
+    /// The same position with coordinates from 0 to below the period.
     pub fn wrap(&self, position: Vec2) -> Vec2 {
-        Vec2 { x: wrap(position.x, self.width), y: wrap(position.y, self.height) }
+        if self.period.x == f64::INFINITY {
+            return position;
+        }
+        Vec2 { x: wrap(position.x, self.period.x), y: wrap(position.y, self.period.y) }
     }
 
     /// The shortest displacement from `from` to `to`; both within the torus.
     #[inline(always)]
     pub fn displacement(&self, from: Vec2, to: Vec2) -> Vec2 {
-        Vec2 { x: shortest(to.x - from.x, self.width), y: shortest(to.y - from.y, self.height) }
+        let Vec2 { x, y } = self.period;
+        Vec2 { x: shortest(to.x - from.x, x), y: shortest(to.y - from.y, y) }
     }
 
     /// Length of the shortest displacement between two positions, cm.
@@ -137,7 +223,7 @@ mod tests {
 
     use super::*;
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 600.0 };
+    const TORUS: Torus = Torus::new(1000.0, 600.0);
 
     fn point() -> impl Strategy<Value = Vec2> {
         (-1e4..1e4, -1e4..1e4).prop_map(|(x, y)| TORUS.wrap(Vec2::new(x, y)))

@@ -4,6 +4,7 @@ mod address;
 
 use std::{mem, ops::Range};
 
+use crate::bodies::{Bodies, Placement, Pose};
 use crate::communication::{Mode, Radio};
 use crate::controllers::Controller;
 use crate::fitness::{Fitness, Moment};
@@ -35,6 +36,10 @@ pub(crate) struct Trial<'a> {
     isa: Isa,
     swarm: Swarm,
     neighbours: Neighbours,
+    /// The neighbours whose frames nothing blocks, where something may.
+    audible: Option<Neighbours>,
+    /// Bodies and obstacles, in a world with them.
+    room: Option<(Bodies, Vec<Placement>)>,
     radio: Radio,
     lights: Vec<Vec2>,
     light_paths: Vec<LightPath>,
@@ -91,6 +96,13 @@ pub(crate) fn try_places(
     trial: u32,
 ) -> Result<(), EvaluateError> {
     let address = Address { seed: simulation.seed, trial_set, trial };
+    if let Some(room) = &simulation.world.room {
+        address.furnish(room, &simulation.world)?;
+        let World { lights, areas, torus, .. } = &simulation.world;
+        address.place_static_objects(lights, torus)?;
+        address.place_static_objects(areas, torus)?;
+        return Ok(());
+    }
     for site in simulation.world.sites() {
         let mut stream = address.stream(Purpose::Positions, site.object);
         address.place(site, &simulation.world.torus, &mut stream)?;
@@ -111,11 +123,24 @@ impl<'a> Trial<'a> {
         let mut positions = Vec::with_capacity(world.n_robots());
         let mut headings = Vec::with_capacity(world.n_robots());
         let mut groups = Vec::with_capacity(world.groups.len());
-        for group in &world.groups {
+        let furnished = match &world.room {
+            Some(room) => Some(address.furnish(room, world)?),
+            None => None,
+        };
+        for (number, group) in world.groups.iter().enumerate() {
             let mut stream = address.stream(Purpose::Positions, group.site.object);
-            positions.extend(address.place(&group.site, &world.torus, &mut stream)?);
-            let mut orientations = address.stream(Purpose::Orientations, group.site.object);
-            headings.extend(group.headings.draw(&mut orientations));
+            match &furnished {
+                Some(furnished) => {
+                    let poses = &furnished.robots[number];
+                    positions.extend(poses.iter().map(|pose| pose.position));
+                    headings.extend(poses.iter().map(|pose| pose.heading));
+                }
+                None => {
+                    positions.extend(address.place(&group.site, &world.torus, &mut stream)?);
+                    let mut orientations = address.stream(Purpose::Orientations, group.site.object);
+                    headings.extend(group.headings.draw(&mut orientations));
+                }
+            }
             let perturbations =
                 Perturbations::new(&group.perturbations, group.robots.len(), |number| {
                     address.stream(Purpose::Perturbation, number)
@@ -153,6 +178,8 @@ impl<'a> Trial<'a> {
             isa: simulation.isa,
             swarm,
             neighbours: Neighbours::new(world.sensing_range(), n_robots),
+            audible: world.has_shadows().then(|| Neighbours::new(0.0, n_robots)),
+            room: furnished.map(|furnished| (furnished.bodies, furnished.obstacles)),
             radio,
             switches: Switches { lights: vec![true; lights.len()], areas: vec![true; areas.len()] },
             lights,
@@ -200,10 +227,21 @@ impl<'a> Trial<'a> {
         if moved {
             self.neighbours.update(&self.world.torus, &self.swarm.positions);
         }
-        if moved || turned {
-            self.radio.listen(&self.neighbours, &self.swarm);
+        if let (true, Some(audible), Some((bodies, _))) = (moved, &mut self.audible, &self.room) {
+            audible.clone_from(&self.neighbours);
+            let (world, positions) = (self.world, &self.swarm.positions);
+            audible.retain(|robot, neighbour| {
+                let other = neighbour.robot;
+                let blocked_by = world.groups[world.group_of(robot)].frames_blocked_by;
+                let ends = [robot, other];
+                bodies.is_clear(positions[robot], positions[other], blocked_by, &ends)
+            });
         }
-        self.radio.receive(&self.neighbours, &mut self.swarm);
+        let audible = self.audible.as_ref().unwrap_or(&self.neighbours);
+        if moved || turned {
+            self.radio.listen(audible, &self.swarm);
+        }
+        self.radio.receive(audible, &mut self.swarm);
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
             let surroundings = Surroundings {
                 torus: &self.world.torus,
@@ -212,6 +250,7 @@ impl<'a> Trial<'a> {
                 lights: &self.lights,
                 areas: &self.areas,
                 switches: &self.switches,
+                bodies: self.room.as_ref().map(|(bodies, _)| bodies),
             };
             state.senses.update(group, &self.swarm, &surroundings);
         }
@@ -435,6 +474,23 @@ impl<'a> Trial<'a> {
     /// Moves all robots by their wheels.
     fn drive(&mut self) {
         let swarm = &mut self.swarm;
+        if let Some((bodies, _)) = &mut self.room {
+            for group in &self.world.groups {
+                let Some(drive) = &group.drive else { continue };
+                for robot in group.robots.clone() {
+                    let (speed, turning) = drive.asks(swarm.wheels[robot]);
+                    bodies.ask(robot, speed, turning);
+                }
+            }
+            swarm.moved |= bodies.step();
+            for robot in 0..swarm.positions.len() {
+                let Pose { position, heading } = bodies.pose(robot);
+                swarm.moved |= swarm.positions[robot] != position;
+                swarm.turned |= swarm.headings[robot] != heading;
+                (swarm.positions[robot], swarm.headings[robot]) = (position, heading);
+            }
+            return;
+        }
         for group in &self.world.groups {
             let Some(drive) = &group.drive else { continue };
             for robot in group.robots.clone().filter(|&robot| swarm.wheels[robot] != [0.0; 2]) {

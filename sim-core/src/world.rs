@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::bodies::{Chassis, Room};
 use crate::communication::{Antenna, Quantiser, Receiver};
 use crate::drive::Drive;
 use crate::initializers::{Headings, Positions};
@@ -11,8 +12,9 @@ use crate::problems::Problems;
 use crate::sensors::{self, Decay, MountedSensor};
 use crate::torus::Torus;
 use experiment_file::{
-    AlgorithmConfig, GroundAreaConfig, LightController, LightSourceConfig, ObjectConfig,
-    PerturbationsConfig, RobotConfig, RobotController, SensorQuery, SensorsConfig, WorldConfig,
+    AlgorithmConfig, BlockedBy, BodyConfig, Boundary, GroundAreaConfig, LightController,
+    LightSourceConfig, ObjectConfig, PerturbationsConfig, RobotConfig, RobotController,
+    SensorQuery, SensorsConfig, WorldConfig,
 };
 
 /// Communication range of robots without radio, cm.
@@ -39,6 +41,8 @@ pub(crate) struct World {
     pub evolvable: usize,
     /// The parameter alpha of the swarm's border, in units of 1 / world width.
     pub alpha: f64,
+    /// The room, in a world with bodies.
+    pub room: Option<Room>,
 }
 
 /// The robots of one object.
@@ -70,6 +74,10 @@ pub(crate) struct RobotGroup {
     pub initial_frame: bool,
     /// Their perturbations.
     pub perturbations: PerturbationsConfig,
+    /// What blocks frames on their way to them.
+    pub frames_blocked_by: BlockedBy,
+    /// Their bodies, in a world with bodies.
+    pub chassis: Chassis,
 }
 
 impl RobotGroup {
@@ -97,7 +105,12 @@ impl World {
     ) -> Option<Self> {
         let evolvable_object = &algorithm.evolvable_object;
         let mut world = Self {
-            torus: Torus { width: config.width, height: config.height },
+            torus: match config.boundary {
+                Boundary::Torus => Torus::new(config.width, config.height),
+                Boundary::Walls | Boundary::Polygon(_) => {
+                    Torus::walled(config.width, config.height)
+                }
+            },
             groups: Vec::new(),
             antennas: Vec::new(),
             lights: Vec::new(),
@@ -106,6 +119,7 @@ impl World {
             message_len: 0,
             evolvable: 0,
             alpha: algorithm.fitness_params.alpha,
+            room: Room::compile(config, problems),
         };
         // Sensors refer to lights and areas, which may come later than their robots.
         for (index, (name, object)) in config.objects.iter().enumerate() {
@@ -180,6 +194,12 @@ impl World {
         let sensors = self.groups.iter().flat_map(|group| &group.sensors);
         let ranges = receivers.map(|receiver| receiver.range);
         ranges.chain(sensors.map(|mounted| mounted.sensor.robots_within())).fold(0.0, f64::max)
+    }
+
+    /// Whether anything may be between a receiver and the robots that it hears.
+    pub fn has_shadows(&self) -> bool {
+        self.room.is_some()
+            && self.groups.iter().any(|group| group.frames_blocked_by != BlockedBy::Nothing)
     }
 
     fn add_lights(
@@ -271,10 +291,19 @@ impl World {
             sending_steps: transmitter.map_or(0, |transmitter| transmitter.sending_steps),
             initial_frame: transmitter.is_some_and(|transmitter| transmitter.initial_frame),
             perturbations: config.perturbations.clone(),
+            frames_blocked_by: receiver.map_or(BlockedBy::Nothing, |receiver| receiver.blocked_by),
+            chassis: chassis(config),
         };
         self.antennas.extend(group.robots.clone().map(|_| antenna(config, network)));
         self.groups.push(group);
     }
+}
+
+fn chassis(config: &RobotConfig) -> Chassis {
+    let BodyConfig { radius, mass, push_force } = config.body.unwrap_or_default();
+    let wheels = config.actuators.wheel_actuator.as_ref();
+    let axle_length = wheels.map_or(2.0 * radius, |wheels| wheels.axle_length);
+    Chassis { radius, mass, push_force, axle_length }
 }
 
 /// The readings of robots with these sensors, each with its number of values.

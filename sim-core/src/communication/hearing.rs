@@ -370,7 +370,7 @@ mod tests {
     use super::*;
     use crate::torus::Torus;
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
+    const TORUS: Torus = Torus::new(1000.0, 1000.0);
     const ANTENNA: Antenna = Antenna {
         emits_within: Some(100.0),
         receiver: Some(Receiver {

@@ -13,7 +13,7 @@ use experiment_file::{
     WholeReceiver,
 };
 
-const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
+const TORUS: Torus = Torus::new(1000.0, 1000.0);
 
 fn experiments() -> [ExperimentConfig; 4] {
     [experiment_a(), experiment_b(), experiment_c(), experiment_d()]

@@ -133,7 +133,7 @@ fn every_fitness_function_is_defined() {
 impl Moment<'static> {
     /// A moment without robots, in a world of 1000 x 1000 cm.
     pub const EMPTY: Self = Self {
-        torus: &Torus { width: 1000.0, height: 1000.0 },
+        torus: &Torus::new(1000.0, 1000.0),
         step: 0,
         moved: true,
         positions: &[],

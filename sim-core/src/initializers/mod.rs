@@ -75,6 +75,23 @@ impl Positions {
             }
         })
     }
+
+    /// Draws another position for one object, if each is drawn by itself.
+    pub fn draw_one(&self, torus: &Torus, stream: &mut Stream) -> Option<Vec2> {
+        let one = match *self {
+            Self::Uniform { low, high, .. } => Self::Uniform { low, high, n: 1 },
+            Self::Circumference { radius, center, .. } => {
+                Self::Circumference { radius, center, n: 1 }
+            }
+            Self::Fixed(_) | Self::Graph { .. } => return None,
+        };
+        one.draw(torus, stream).ok()?.pop()
+    }
+
+    /// Whether positions are drawn together, and another draw gives others.
+    pub fn is_arrangement(&self) -> bool {
+        matches!(self, Self::Graph { .. })
+    }
 }
 
 /// Start headings of `n` robots.
@@ -132,7 +149,7 @@ mod tests {
     use super::*;
     use determinism::random::Purpose;
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 500.0 };
+    const TORUS: Torus = Torus::new(1000.0, 500.0);
 
     fn stream() -> Stream {
         Stream::new(1, 2, 3, Purpose::Positions, 0)

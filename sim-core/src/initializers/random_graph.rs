@@ -91,7 +91,7 @@ mod tests {
     use super::*;
     use determinism::random::Purpose;
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
+    const TORUS: Torus = Torus::new(1000.0, 1000.0);
 
     fn graph(n: usize, trial: u64) -> Vec<Vec2> {
         let mut stream = Stream::new(0, 0, trial, Purpose::Positions, 0);
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_full_world_is_an_error() {
-        let small = Torus { width: 100.0, height: 100.0 };
+        let small = Torus::new(100.0, 100.0);
         let mut stream = Stream::new(0, 0, 0, Purpose::Positions, 0);
         let result = draw(100.0, Vec2::new(50.0, 50.0), 20, &small, &mut stream);
         assert!(matches!(result, Err(Unplaceable { index }) if index > 1), "{result:?}");

@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn a_robot_stands_on_areas_of_the_colour_only() {
-        let torus = Torus { width: 1000.0, height: 1000.0 };
+        let torus = Torus::new(1000.0, 1000.0);
         let areas = [Vec2::new(0.0, 0.0), Vec2::new(500.0, 500.0)];
         let sensor = GroundSensor { areas: vec![(0, 100.0)] };
         let neighbours = &Neighbours::new(0.0, 1);
@@ -64,6 +64,7 @@ mod tests {
                 lights: &[],
                 areas: &areas,
                 switches,
+                bodies: None,
             };
             let from = Viewpoint { robot: 0, position: Vec2::new(x, y), heading: 0.0 };
             let mut reading = [7.0];

@@ -4,7 +4,7 @@ use super::{Decay, Noise, NoiseStream, Sensor, Surroundings, Viewpoint, take_sec
 use crate::objects::StaticObjects;
 use crate::torus::wrap_angle;
 use crate::world::World;
-use experiment_file::LightSensorConfig;
+use experiment_file::{BlockedBy, LightSensorConfig};
 
 /// A light sensor and the lights that it can see. Readings per sector, in
 /// \[0, 1\].
@@ -14,7 +14,8 @@ pub(crate) struct LightSensor {
     /// Largest angle between a sector's direction and a light that it sees, radians.
     aperture: f64,
     noise_deviation: f64,
-    /// Lights of its colour, each with the distance within which the sensor sees it, cm.
+    blocked_by: BlockedBy,
+    /// Lights of its colour, each with the distance within which it is seen, cm.
     lights: Vec<(usize, f64)>,
 }
 
@@ -25,7 +26,18 @@ pub(super) fn light_sensor(config: &LightSensorConfig, world: &World) -> LightSe
         decay: Decay { rho: config.decay_rho, phi: config.decay_phi },
         aperture: config.aperture,
         noise_deviation: config.noise_variance.sqrt(),
+        blocked_by: config.blocked_by,
         lights: lights.map(|(light, range)| (light, range.min(config.range))).collect(),
+    }
+}
+
+impl LightSensor {
+    /// Whether nothing blocks the way of a light to a robot.
+    fn shines_on(&self, light: usize, from: Viewpoint, surroundings: &Surroundings<'_>) -> bool {
+        let light = surroundings.lights[light];
+        surroundings.bodies.is_none_or(|bodies| {
+            bodies.is_clear(from.position, light, self.blocked_by, &[from.robot])
+        })
     }
 }
 
@@ -40,7 +52,7 @@ impl Sensor for LightSensor {
         for &(light, reach) in self.lights.iter().filter(is_on) {
             let away = surroundings.torus.displacement(from.position, surroundings.lights[light]);
             let rho = away.norm();
-            if rho <= reach {
+            if rho <= reach && self.shines_on(light, from, surroundings) {
                 let bearing = wrap_angle(away.angle() - from.heading);
                 take_sectors(rho, bearing, self.decay, self.aperture, reading, |sum, strength| {
                     sum + strength
@@ -60,7 +72,7 @@ mod tests {
     use crate::swarm::Swarm;
     use crate::torus::{Torus, Vec2};
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
+    const TORUS: Torus = Torus::new(1000.0, 1000.0);
 
     fn sense(lights: &[Vec2], reach: f64, heading: f64) -> Vec<f64> {
         sense_within(PI, lights, reach, heading)
@@ -71,6 +83,7 @@ mod tests {
             decay: Decay { rho: 0.05, phi: 1.0 },
             aperture,
             noise_deviation: 0.0,
+            blocked_by: BlockedBy::Nothing,
             lights: (0..lights.len()).map(|light| (light, reach)).collect(),
         };
         let from = Viewpoint { robot: 0, position: Vec2::new(5.0, 5.0), heading };
@@ -83,6 +96,7 @@ mod tests {
             lights,
             areas: &[],
             switches,
+            bodies: None,
         };
         let mut readings = vec![7.0; 4];
         sensor.sense(from, &surroundings, &mut readings);

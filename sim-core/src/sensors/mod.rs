@@ -16,6 +16,7 @@ use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 
 use self::{bodies::*, ground::*, light::*, own::*, robots::*, scripted::*};
+use crate::bodies::Bodies;
 use crate::neighbours::Neighbours;
 use crate::objects::Switches;
 use crate::swarm::Swarm;
@@ -90,7 +91,11 @@ impl NoiseStream {
     /// these sensors.
     pub const LIGHT_AND_DISTANCE: Self = Self(0);
 
-    /// The number of a robot's stream for [`Purpose::SensorNoise`](determinism::random::Purpose).
+    /// Of the proximity sensor.
+    pub const PROXIMITY: Self = Self(1);
+
+    /// The stream's number, at [`Purpose::SensorNoise`](determinism::random::Purpose),
+    /// for a robot.
     pub fn number(self, robot: usize) -> u64 {
         // There are far fewer than 2^32 robots.
         u64::from(self.0) << 32 | robot as u64
@@ -144,6 +149,8 @@ pub(crate) struct Surroundings<'a> {
     pub areas: &'a [Vec2],
     /// Which lights and areas are on.
     pub switches: &'a Switches,
+    /// Bodies, in a world with them.
+    pub bodies: Option<&'a Bodies>,
 }
 
 /// The fading of perceived strength with distance and angle.

@@ -62,16 +62,23 @@ mod tests {
     use crate::torus::{Torus, Vec2};
 
     #[test]
-    fn a_robot_senses_its_own_state() {
-        let torus = &Torus { width: 1000.0, height: 800.0 };
+    fn a_robot_knows_itself() {
+        let torus = &Torus::new(1000.0, 800.0);
         let (position, heading) = (Vec2::new(730.0, 20.0), 0.75 * TAU);
         let mut swarm = Swarm::new(vec![Vec2::default(), position], vec![0.0, heading], 0);
         swarm.carries[1] = true;
         let neighbours = &Neighbours::new(0.0, 2);
         let switches = &Switches { lights: Vec::new(), areas: Vec::new() };
         let swarm = &swarm;
-        let surroundings =
-            Surroundings { torus, swarm, neighbours, lights: &[], areas: &[], switches };
+        let surroundings = Surroundings {
+            torus,
+            swarm,
+            neighbours,
+            lights: &[],
+            areas: &[],
+            switches,
+            bodies: None,
+        };
         let read = |sensor: &dyn Sensor, robot: usize, reading_len: usize| {
             let (position, heading) = (swarm.positions[robot], swarm.headings[robot]);
             let mut reading = vec![7.0; reading_len];

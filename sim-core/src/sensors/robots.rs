@@ -81,7 +81,7 @@ mod tests {
     use crate::swarm::Swarm;
     use crate::torus::{Torus, Vec2};
 
-    const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
+    const TORUS: Torus = Torus::new(1000.0, 1000.0);
 
     fn sense(others: &[(f64, f64)]) -> Vec<f64> {
         let sensor = DistanceSensorConfig { noise_variance: 0.0, ..Default::default() };
@@ -101,6 +101,7 @@ mod tests {
             lights: &[],
             areas: &[],
             switches,
+            bodies: None,
         };
         sensor.sense(from, &surroundings, &mut readings);
         readings
@@ -129,8 +130,8 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_come_first_across_the_seam_and_missing_robots_are_zeros() {
-        let torus = &Torus { width: 1000.0, height: 1000.0 };
+    fn the_nearest_come_first_across_the_seam_and_nobody_is_zeros() {
+        let torus = &Torus::new(1000.0, 1000.0);
         let places = [(5.0, 5.0), (60.0, 5.0), (985.0, 5.0), (5.0, 60.0), (500.0, 500.0)];
         let headings: Vec<f64> = (0..5).map(f64::from).collect();
         let read = |n_robots: usize, n_neighbors: u32| {
@@ -138,8 +139,15 @@ mod tests {
             let swarm = &Swarm::new(positions, headings[..n_robots].to_vec(), 0);
             let neighbours = &Neighbours::new(0.0, n_robots);
             let switches = &Switches { lights: Vec::new(), areas: Vec::new() };
-            let surroundings =
-                Surroundings { torus, swarm, neighbours, lights: &[], areas: &[], switches };
+            let surroundings = Surroundings {
+                torus,
+                swarm,
+                neighbours,
+                lights: &[],
+                areas: &[],
+                switches,
+                bodies: None,
+            };
             let from = Viewpoint { robot: 0, position: swarm.positions[0], heading: 0.0 };
             let sensor = NeighborhoodSensorConfig { n_neighbors };
             let mut reading = vec![7.0; PER_NEIGHBOUR * n_neighbors as usize];

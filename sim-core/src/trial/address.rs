@@ -3,9 +3,11 @@
 use determinism::random::{Purpose, Stream, TrialSet};
 use task_script::ScriptError;
 
+use crate::bodies::{Furnished, NoPlace, Room};
 use crate::objects::{Site, StaticObjects};
 use crate::simulation::EvaluateError;
 use crate::torus::{Torus, Vec2};
+use crate::world::World;
 
 /// The address of a trial.
 #[derive(Debug, Clone, Copy)]
@@ -48,6 +50,21 @@ impl Address {
             index: unplaceable.index,
             trial_set: self.trial_set,
             trial: self.trial,
+        })
+    }
+
+    /// Draws where all bodies of a room start.
+    pub fn furnish(self, room: &Room, world: &World) -> Result<Furnished, EvaluateError> {
+        let crews = world.groups.iter().map(|group| (&group.site, &group.headings, group.chassis));
+        let crews: Vec<_> = crews.collect();
+        let stream = |purpose, object| self.stream(purpose, object);
+        room.furnish(&world.torus, &crews, stream).map_err(|NoPlace { site, index }| {
+            EvaluateError::Unplaceable {
+                object: site.name.clone(),
+                index,
+                trial_set: self.trial_set,
+                trial: self.trial,
+            }
         })
     }
 
