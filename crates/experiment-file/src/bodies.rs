@@ -85,6 +85,8 @@ parameters! {
         /// Steps of the physics in an environment step. With more, faster robots cannot pass
         /// through each other.
         substeps: u32 = whole([1, limits::SUBSTEPS], 4),
+        /// Version of the physics, on which every bit of a result depends.
+        format: u32 = whole([1, 1], 1),
     }
 
     /// The body of a robot: a disc.

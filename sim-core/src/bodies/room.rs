@@ -126,7 +126,7 @@ pub(crate) type Crew<'a> = (&'a Site, &'a Headings, Chassis);
 impl Room {
     /// Compiles walls, obstacles and movables; `None` in a world without bodies.
     pub fn compile(config: &file::WorldConfig, problems: &mut Problems) -> Option<Self> {
-        let file::BodiesConfig { substeps } = config.bodies?;
+        let file::BodiesConfig { substeps, .. } = config.bodies?;
         let outline = points(&config.outline()?);
         let is_rectangle = config.boundary == file::Boundary::Walls;
         let mut room = Self {
