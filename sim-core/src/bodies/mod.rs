@@ -259,16 +259,46 @@ impl Bodies {
         &bumps[..bumps.partition_point(|bump| bump.robot == robot)]
     }
 
+    /// Number of things that may be in the way of a body.
+    pub fn n_things(&self) -> usize {
+        self.fixtures.len() + self.bodies.len()
+    }
+
+    /// Number of parts of walls and obstacles.
+    pub fn n_fixtures(&self) -> usize {
+        self.fixtures.len()
+    }
+
+    /// Puts a load at rest elsewhere if it would overlap nothing there; returns whether it did.
+    fn put(&mut self, load: usize, pose: Pose) -> bool {
+        if !self.is_free_beside(&self.bodies[load].shape, pose, Some(load)) {
+            return false;
+        }
+        let body = &mut self.bodies[load];
+        (body.position, body.heading) = (pose.position, pose.heading);
+        body.axis = Vec2::unit(pose.heading);
+        (body.velocity, body.turning) = (Vec2::default(), 0.0);
+        self.bumps.retain(|bump| bump.body != Some(load));
+        true
+    }
+
     /// Whether a body of this shape would overlap nothing at this pose.
     pub fn is_free(&self, shape: &Shape, pose: Pose) -> bool {
+        self.is_free_beside(shape, pose, None)
+    }
+
+    /// The same for a body of the room, `itself`, which is about to leave its place.
+    fn is_free_beside(&self, shape: &Shape, pose: Pose, itself: Option<usize>) -> bool {
         let placed = Placed { shape, position: pose.position, axis: Vec2::unit(pose.heading) };
         let mut is_free = true;
         let mut meet = |touch: collision::Touch| is_free &= touch.gap >= 0.0;
         for fixture in &self.fixtures {
             solver::meet(placed, fixture, 0.0, &mut meet);
         }
-        for body in &self.bodies {
-            collision::between(placed, body.placed(), 0.0, &mut meet);
+        for (number, body) in self.bodies.iter().enumerate() {
+            if Some(number) != itself {
+                collision::between(placed, body.placed(), 0.0, &mut meet);
+            }
         }
         is_free
     }

@@ -1,5 +1,7 @@
 //! The room of a world with bodies, and where its bodies start: never on each other.
 
+use std::ops::Range;
+
 use super::collision::Segment;
 use super::shape::{Shape, contains, sides};
 use super::{Bodies, Chassis, Fixture, Form, Load, Pose};
@@ -37,6 +39,8 @@ pub(crate) struct Room {
 #[derive(Debug, Clone)]
 pub(crate) struct Things {
     pub site: Site,
+    /// Their numbers among all obstacles, or all movables.
+    pub members: Range<usize>,
     headings: Headings,
     /// Outline in the object's own frame, for those who draw it.
     pub outline: Outline,
@@ -92,6 +96,13 @@ pub(crate) enum Placement {
 }
 
 impl Placement {
+    fn contains(&self, place: Vec2) -> bool {
+        match self {
+            Self::Disc(centre, radius) => (*centre - place).norm() < *radius,
+            Self::Polygon(corners) => contains(corners, place),
+        }
+    }
+
     fn fixtures(&self) -> Vec<Fixture> {
         let fixture = |form| Fixture { form, is_wall: false };
         match self {
@@ -155,7 +166,8 @@ impl Room {
                     let (n, outline) =
                         (obstacle.num_instances, Outline::new(&obstacle.params.shape()));
                     let starts = &obstacle.initializers;
-                    let things = Things::new(index, name, n, starts, outline, None, problems);
+                    let members = following(&room.obstacles, n);
+                    let things = Things::new(index, name, members, starts, outline, None, problems);
                     room.obstacles.extend(things);
                 }
                 file::ObjectConfig::Movable(movable) => {
@@ -163,7 +175,9 @@ impl Room {
                     let file::MovableParams { mass, friction, .. } = movable.params;
                     let load = Load { shape: outline.shape(), mass, friction };
                     let (n, starts) = (movable.num_instances, &movable.initializers);
-                    let things = Things::new(index, name, n, starts, outline, Some(load), problems);
+                    let members = following(&room.movables, n);
+                    let load = Some(load);
+                    let things = Things::new(index, name, members, starts, outline, load, problems);
                     room.movables.extend(things);
                 }
                 file::ObjectConfig::Robot(robot) => {
@@ -185,6 +199,24 @@ impl Room {
             Form::Segment(Segment { from, to, .. }) => Some((from, to)),
             Form::Disc(..) => None,
         })
+    }
+
+    /// Whether a place is within the boundary and in no obstacle.
+    fn has_ground_at(&self, place: Vec2, obstacles: &[Placement]) -> bool {
+        contains(&self.outline, place) && !obstacles.iter().any(|obstacle| obstacle.contains(place))
+    }
+
+    /// Puts a movable at rest elsewhere, if it is in the room there and overlaps nothing; returns
+    /// whether it did.
+    pub fn put(
+        &self,
+        bodies: &mut Bodies,
+        obstacles: &[Placement],
+        movable: usize,
+        pose: Pose,
+    ) -> bool {
+        let load = bodies.loads().start + movable;
+        self.has_ground_at(pose.position, obstacles) && bodies.put(load, pose)
     }
 
     /// Draws where everything starts: obstacles, then movables, then robots, each where it
@@ -248,22 +280,28 @@ impl Things {
     fn new(
         index: usize,
         name: &str,
-        n: u32,
+        members: Range<usize>,
         starts: &file::BodyInitializers,
         outline: Outline,
         load: Option<Load>,
         problems: &mut Problems,
     ) -> Option<Self> {
-        let n = n as usize;
+        let n = members.len();
         let site = Site::new(index, name, Positions::new(&starts.positions, n), problems)?;
         match Headings::new(&starts.orientations, n) {
-            Ok(headings) => Some(Self { site, headings, outline, load }),
+            Ok(headings) => Some(Self { site, members, headings, outline, load }),
             Err(message) => {
                 problems.add(format!("world.objects.{name}.initializers.orientations"), message);
                 None
             }
         }
     }
+}
+
+/// Numbers of `n` more things.
+fn following(things: &[Things], n: u32) -> Range<usize> {
+    let first = things.last().map_or(0, |things| things.members.end);
+    first..first + n as usize
 }
 
 /// What is placed so far.
@@ -324,11 +362,7 @@ impl Placing<'_> {
 
     /// Whether a body is in the room and overlaps nothing; then it stays there.
     fn has_room_for(&mut self, shape: &Shape, pose: Pose) -> bool {
-        let is_free = contains(&self.room.outline, pose.position)
-            && !self.solids.iter().any(|solid| match solid {
-                Placement::Disc(centre, radius) => (*centre - pose.position).norm() < *radius,
-                Placement::Polygon(corners) => contains(corners, pose.position),
-            })
+        let is_free = self.room.has_ground_at(pose.position, &self.solids)
             && self.bodies.is_free(shape, pose);
         if is_free {
             self.bodies.add_load(&Load { shape: shape.clone(), mass: 1.0, friction: 0.0 }, pose);
