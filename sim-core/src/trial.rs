@@ -390,18 +390,19 @@ impl<'a> Trial<'a> {
         run: impl FnOnce(&mut ScriptRun<'a>, View<'_>) -> Result<T, ScriptError>,
     ) -> Result<Option<T>, EvaluateError> {
         let Some(script) = &mut self.script else { return Ok(None) };
-        let Self { world, swarm, lights, areas, switches, groups, n_steps, goes_on, .. } = self;
+        let Self { world, swarm, lights, areas, switches, room, groups, .. } = self;
         let view = View {
             world,
             swarm,
             lights,
             areas,
             switches,
+            room: room.as_mut(),
             groups,
             step,
-            n_steps: *n_steps,
+            n_steps: self.n_steps,
             may: May::Look,
-            goes_on: *goes_on,
+            goes_on: self.goes_on,
             kept: None,
         };
         run(script, view).map(Some).map_err(|error| self.address.failed(error, step))

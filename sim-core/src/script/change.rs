@@ -22,7 +22,8 @@ pub(crate) enum May<'a> {
     Act { robot: usize, plan: &'a mut Plan, stream: &'a mut Stream },
     /// None: the function returns the new place of the light or area.
     Move { thing: Object, stream: &'a mut Stream },
-    /// Whether robots fail and carry something, and whether lights and areas are on.
+    /// Whether robots fail and carry something, whether lights and areas are on, and where
+    /// movables are.
     React,
 }
 
@@ -38,8 +39,8 @@ impl May<'_> {
             }
             Self::Move { .. } => "`move` returns the new place, `(x, y)`, and `state` is a dict",
             Self::React => {
-                "`react` sets `failed` and `carries` of robots and `on` of lights and areas, and \
-                 `state` is a dict"
+                "`react` sets `failed` and `carries` of robots and `on` of lights and areas, \
+                 `world.place` puts movables elsewhere, and `state` is a dict"
             }
         }
     }

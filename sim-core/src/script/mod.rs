@@ -1,7 +1,8 @@
-//! The script of an experiment's task, compiled once and executed in every trial. `names` has the
-//! names for scripts, `view` reads the world for scripts, `change` makes their changes, and
-//! `sensing` computes readings with them.
+//! The task that an experiment brings as a script: compiled once, executed in every trial.
+//! `names` has the names for scripts, `view` and `bodies` read the world for them, `change` makes
+//! their changes, and `sensing` computes their readings.
 
+mod bodies;
 mod change;
 mod names;
 mod sensing;

@@ -1,6 +1,7 @@
 //! Scripts in episodes: the built-in tasks as scripts, to the same bits, and failures.
 
 mod acting;
+mod bodies;
 mod sensing;
 
 use determinism::Isa;

@@ -10,6 +10,7 @@ use task_script::{Host, Meter, Name, Object, Value};
 
 use super::change::May;
 use super::names::Named;
+use crate::bodies::{Bodies, Placement};
 use crate::border;
 use crate::communication::Mode;
 use crate::objects::{StaticObjects, Switches};
@@ -29,6 +30,7 @@ pub(super) enum Kind {
     Robot,
     Light,
     Area,
+    Movable,
 }
 
 impl Kind {
@@ -37,6 +39,7 @@ impl Kind {
             1 => Self::Robot,
             2 => Self::Light,
             3 => Self::Area,
+            4 => Self::Movable,
             _ => Self::World,
         }
     }
@@ -47,6 +50,7 @@ impl Kind {
             Self::Robot => "a robot",
             Self::Light => "a light",
             Self::Area => "an area",
+            Self::Movable => "a movable",
         }
     }
 }
@@ -74,6 +78,8 @@ pub(crate) struct View<'a> {
     pub lights: &'a mut [Vec2],
     pub areas: &'a mut [Vec2],
     pub switches: &'a mut Switches,
+    /// Bodies and obstacles, in a world with them.
+    pub room: Option<&'a mut (Bodies, Vec<Placement>)>,
     /// Readings of robots, group by group.
     pub groups: &'a [Group],
     /// Environment step, from 0.
@@ -87,7 +93,7 @@ pub(crate) struct View<'a> {
     pub kept: Option<&'a mut Kept>,
 }
 
-type Answer = Result<Value, String>;
+pub(super) type Answer = Result<Value, String>;
 
 impl<'a> View<'a> {
     /// The same step for another call, which may make the changes of `may`.
@@ -98,6 +104,7 @@ impl<'a> View<'a> {
             lights: self.lights,
             areas: self.areas,
             switches: self.switches,
+            room: self.room.as_deref_mut(),
             groups: self.groups,
             step: self.step,
             n_steps: self.n_steps,
@@ -136,6 +143,10 @@ impl<'a> View<'a> {
             Named::Robots => (Kind::Robot, self.world.evaluated()),
             Named::AllRobots => (Kind::Robot, 0..self.world.n_robots()),
             Named::Lights => (Kind::Light, 0..self.lights.len()),
+            Named::Movables => {
+                let bodies = self.room.as_deref().map(|(bodies, _)| bodies);
+                (Kind::Movable, 0..bodies.map_or(0, |bodies| bodies.loads().len()))
+            }
             _ => (Kind::Area, 0..self.areas.len()),
         };
         let kept = self.kept()?;
@@ -155,6 +166,7 @@ impl<'a> View<'a> {
             Kind::Robot => Ok(self.swarm.positions[number]),
             Kind::Light => Ok(self.lights[number]),
             Kind::Area => Ok(self.areas[number]),
+            Kind::Movable => Ok(self.pose(number)?.position),
         }
     }
 
@@ -176,20 +188,20 @@ impl<'a> View<'a> {
     }
 
     /// The lights or areas to which an object belongs.
-    fn objects(&self, object: Object) -> Result<&'a StaticObjects, String> {
+    pub(super) fn objects(&self, object: Object) -> Result<&'a StaticObjects, String> {
         let groups = match Kind::of_object(object) {
             Kind::Light => &self.world.lights,
             _ => &self.world.areas,
         };
         let number = object.index as usize;
         let found = groups.iter().find(|group| group.members.contains(&number));
-        found.ok_or_else(|| "there is no such object".into())
+        found.ok_or_else(|| NO_OBJECT.into())
     }
 
     fn of_world(&mut self, name: Named, meter: &Rc<Meter>) -> Answer {
         let torus = self.world.torus;
         match name {
-            Named::Robots | Named::AllRobots | Named::Lights | Named::Areas => {
+            Named::Robots | Named::AllRobots | Named::Lights | Named::Areas | Named::Movables => {
                 self.list(name, meter)
             }
             Named::Center => pair(torus.center(), meter),
@@ -226,6 +238,7 @@ impl<'a> View<'a> {
                 None => Value::Nothing,
             },
             Named::SeesLight => Value::Bool(swarm.photosensitive[robot]),
+            Named::Touches => self.touches(robot, meter)?,
             Named::Failed => Value::Bool(swarm.failed[robot]),
             Named::Carries => Value::Bool(swarm.carries[robot]),
             Named::Group => {
@@ -316,6 +329,13 @@ impl<'a> View<'a> {
             }
             (Named::Centroid, [list]) => pair(torus.centroid(&self.points(list)?), meter)?,
             (Named::Neighbours, [of, range]) => self.neighbours(of, number(range)?, meter)?,
+            (Named::WallsBetween, [a, b]) => Value::Bool(self.walls_between(a, b, meter)?),
+            (Named::Place, [movable, place]) => {
+                Value::Bool(self.place(movable, place, None, meter)?)
+            }
+            (Named::Place, [movable, place, heading]) => {
+                Value::Bool(self.place(movable, place, Some(heading), meter)?)
+            }
             (Named::Border, []) => {
                 let evaluated = self.world.evaluated();
                 // The work per robot, which is the whole cost for a small swarm.
@@ -384,9 +404,13 @@ impl Host for View<'_> {
             (Named::Y, _) => Ok(Value::Float(self.position(object)?.y)),
             (name, Kind::Robot) => self.of_robot(object.index as usize, name, meter),
             (Named::Id, _) => Ok(Value::Int(object.index.into())),
+            (Named::Group, _) => Value::text(self.group(object)?, meter),
+            (Named::Heading, Kind::Movable) => {
+                Ok(Value::Float(self.pose(object.index as usize)?.heading))
+            }
+            (name, Kind::Movable) => Err(no_such(kind, name)),
             (Named::Color, _) => Value::text(&self.objects(object)?.color, meter),
             (Named::Range, _) => Ok(Value::Float(self.objects(object)?.range)),
-            (Named::Group, _) => Value::text(&self.objects(object)?.site.name, meter),
             (name, kind) => Err(no_such(kind, name)),
         }
     }
@@ -431,6 +455,7 @@ impl Host for Nothing<'_> {
     }
 }
 
+pub(super) const NO_OBJECT: &str = "there is no such object";
 const OUTSIDE: &str = "there is no world outside functions";
 
 pub(super) fn thing(kind: Kind, number: usize) -> Value {

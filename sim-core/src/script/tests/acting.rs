@@ -28,7 +28,7 @@ fn light(config: &mut ExperimentConfig) -> &mut LightController {
 }
 
 /// Experiment D with `n_steps` steps, whose robots this script controls.
-fn controlled(text: &str, n_steps: u32) -> ExperimentConfig {
+pub(super) fn controlled(text: &str, n_steps: u32) -> ExperimentConfig {
     let mut config = with_script(experiment_d(), "t.star", text);
     config.algorithm.evaluation_steps = n_steps;
     robot(&mut config).controller = RobotController::ScriptController;
