@@ -378,3 +378,6 @@ fn wall(from: Vec2, to: Vec2, inner: Option<Vec2>) -> Fixture {
 fn points(corners: &[[f64; 2]]) -> Vec<Vec2> {
     corners.iter().map(|&[x, y]| Vec2::new(x, y)).collect()
 }
+
+#[cfg(test)]
+mod tests;
