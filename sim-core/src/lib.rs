@@ -110,7 +110,10 @@ mod world;
 pub use communication::Mode;
 pub use determinism::{Isa, UnknownIsa, random::TrialSet};
 pub use output::Output;
-pub use record::{EpisodeSummary, MeasureName, Measures, ReceivedFrame, RobotRecord, StepRecord};
+pub use record::{
+    EpisodeSummary, MeasureName, Measures, MovableRecord, Outline, ReceivedFrame, RobotRecord,
+    RoomRecord, StepRecord,
+};
 pub use simulation::{EvaluateError, Simulation};
 pub use specified::{SpecifiedSimulation, panic_to_failure};
 pub use starts::{TRYING_TIME_MAX, Tried};

@@ -44,6 +44,48 @@ pub struct StepRecord {
     pub lights: Vec<Vec2>,
     /// Positions of all ground areas during the step, cm.
     pub areas: Vec<Vec2>,
+    /// All movables at the end of the step, in the order of the objects of the world.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub movables: Vec<MovableRecord>,
+}
+
+/// A movable in one step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct MovableRecord {
+    /// Its centre of mass, cm.
+    pub position: Vec2,
+    /// Radians in \[0, 2 pi).
+    pub heading: f64,
+}
+
+/// The room of a trial in a world with bodies: all that does not change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RoomRecord {
+    /// Corners of the boundary, counter-clockwise, cm.
+    pub boundary: Vec<Vec2>,
+    /// The ends of each part of a wall, cm.
+    pub walls: Vec<[Vec2; 2]>,
+    /// Obstacles at their places.
+    pub obstacles: Vec<Outline>,
+    /// Movables, about their centre of mass and with heading 0.
+    pub movables: Vec<Outline>,
+    /// Radius of each robot, cm.
+    pub radii: Vec<f64>,
+}
+
+/// A shape.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outline {
+    /// A disc.
+    Disc {
+        /// cm
+        center: Vec2,
+        /// cm
+        radius: f64,
+    },
+    /// The corners of a polygon, cm.
+    Polygon(Vec<Vec2>),
 }
 
 /// One robot in one step.
@@ -82,6 +124,9 @@ pub struct RobotRecord {
     /// Whether it carries something, as a script decides.
     #[serde(skip_serializing_if = "Not::not")]
     pub carries: bool,
+    /// Whether its body touches something.
+    #[serde(skip_serializing_if = "Not::not")]
+    pub touches: bool,
     /// Whether its LED should be on; `None` if the task does not define it.
     pub target: Option<bool>,
 }

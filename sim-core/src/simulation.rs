@@ -10,9 +10,9 @@ use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 #[cfg(doc)]
 use crate::record::Measures;
-use crate::record::{EpisodeSummary, MeasureName, StepRecord};
+use crate::record::{EpisodeSummary, MeasureName, RoomRecord, StepRecord};
 use crate::script::{self, ScriptTask};
-use crate::trial::try_places;
+use crate::trial::{self, try_places};
 use crate::world::World;
 use determinism::{Isa, random::TrialSet};
 use experiment_file::{ConfigError, ExperimentConfig, FitnessParams, limits};
@@ -291,6 +291,20 @@ impl Simulation {
         let done =
             episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
         Ok(done.then(|| recorder.summary()))
+    }
+
+    /// The room of a trial: boundary, walls, obstacles, and the outlines of movables and robots;
+    /// `None` in a world without bodies.
+    ///
+    /// # Errors
+    ///
+    /// If an object finds no place in the trial.
+    pub fn room(
+        &self,
+        trial_set: impl Into<TrialSet>,
+        trial: u32,
+    ) -> Result<Option<RoomRecord>, EvaluateError> {
+        trial::room(self, trial_set.into(), trial)
     }
 
     /// The network that a genotype encodes, as JSON: stimuli, neurons with `tau`, `bias`, `gain`

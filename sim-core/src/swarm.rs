@@ -106,6 +106,7 @@ impl Swarm {
         refill(&mut record.message, &self.messages[message]);
         record.failed = self.failed[robot];
         record.carries = self.carries[robot];
+        record.touches = false;
         record.target = None;
     }
 

@@ -4,7 +4,7 @@ mod address;
 
 use std::{mem, ops::Range};
 
-use crate::bodies::{Bodies, Placement, Pose};
+use crate::bodies::{Bodies, Pose};
 use crate::communication::{Mode, Radio};
 use crate::controllers::Controller;
 use crate::fitness::{Fitness, Moment};
@@ -13,7 +13,8 @@ use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
 use crate::objects::Switches;
 use crate::perturbations::Perturbations;
-use crate::record::{Measures, RobotRecord, StepRecord};
+use crate::record::Outline;
+use crate::record::{Measures, MovableRecord, RobotRecord, RoomRecord, StepRecord};
 use crate::script::{May, ScriptRun, View};
 use crate::senses::Senses;
 use crate::sensors::Surroundings;
@@ -39,7 +40,7 @@ pub(crate) struct Trial<'a> {
     /// The neighbours whose frames nothing blocks, where something may.
     audible: Option<Neighbours>,
     /// Bodies and obstacles, in a world with them.
-    room: Option<(Bodies, Vec<Placement>)>,
+    room: Option<(Bodies, Vec<Outline>)>,
     radio: Radio,
     lights: Vec<Vec2>,
     light_paths: Vec<LightPath>,
@@ -108,6 +109,17 @@ pub(crate) fn try_places(
         address.place(site, &simulation.world.torus, &mut stream)?;
     }
     Ok(())
+}
+
+/// The room of a trial; `None` in a world without bodies.
+pub(crate) fn room(
+    simulation: &Simulation,
+    trial_set: TrialSet,
+    trial: u32,
+) -> Result<Option<RoomRecord>, EvaluateError> {
+    let address = Address { seed: simulation.seed, trial_set, trial };
+    let Some(room) = &simulation.world.room else { return Ok(None) };
+    Ok(Some(room.record(address.furnish(room, &simulation.world)?)))
 }
 
 impl<'a> Trial<'a> {
@@ -444,7 +456,15 @@ impl<'a> Trial<'a> {
         fitness: Option<f64>,
         record: &mut StepRecord,
     ) -> Result<(), EvaluateError> {
-        let StepRecord { step: number, fitness: of_step, measures, robots, lights, areas } = record;
+        let StepRecord {
+            step: number,
+            fitness: of_step,
+            measures,
+            robots,
+            lights,
+            areas,
+            movables,
+        } = record;
         (*number, *of_step) = (step, fitness);
         self.measure(step, measures)?;
         robots.resize_with(self.world.n_robots(), RobotRecord::default);
@@ -454,6 +474,16 @@ impl<'a> Trial<'a> {
         let targets = self.fitness.as_ref().map_or(&[][..], |fitness| fitness.targets());
         for (robot, target) in self.world.evaluated().zip(targets) {
             robots[robot].target = Some(*target);
+        }
+        if let Some((bodies, _)) = &self.room {
+            for (robot, record) in robots.iter_mut().enumerate() {
+                record.touches = !bodies.bumps(robot).is_empty();
+            }
+            movables.clear();
+            movables.extend(bodies.loads().map(|load| {
+                let Pose { position, heading } = bodies.pose(load);
+                MovableRecord { position, heading }
+            }));
         }
         lights.clone_from(&self.lights);
         areas.clone_from(&self.areas);

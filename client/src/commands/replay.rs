@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
-use sim_core::{StepRecord, TrialSet};
+use sim_core::{RoomRecord, StepRecord, TrialSet};
 use swarm_proto::v1::JudgedFitness;
 use swarm_web::{Episode, Replay, ReplayError, Trials, replay_file};
 
@@ -142,8 +142,18 @@ pub async fn replay(
     };
     let bytes = waiting::busy("computing the episode", || match format {
         Format::Html => html(&episode, trials).map(String::into_bytes),
-        Format::Png => picture::png(&compiled.config, &steps(&episode)?, &args.picture),
-        Format::Svg => picture::svg(&compiled.config, &steps(&episode)?, &args.picture),
+        Format::Png => picture::png(
+            &compiled.config,
+            room(&episode)?.as_ref(),
+            &steps(&episode)?,
+            &args.picture,
+        ),
+        Format::Svg => picture::svg(
+            &compiled.config,
+            room(&episode)?.as_ref(),
+            &steps(&episode)?,
+            &args.picture,
+        ),
     })?;
     args.overwrite.write(&path, &bytes)?;
     progress.print(&path.display().to_string())
@@ -194,6 +204,12 @@ fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> 
         Some(trials) => replay.of_trials(trials),
         None => replay,
     }))
+}
+
+/// The room of an episode in a world with bodies.
+fn room(episode: &Episode<'_>) -> Result<Option<RoomRecord>, Error> {
+    let Episode { simulation, trial_set, trial, .. } = *episode;
+    simulation.room(trial_set, trial).map_err(|error| Error::Input(error.to_string()))
 }
 
 /// All steps of an episode.

@@ -17,6 +17,7 @@ export class Camera {
    *  are most of it. */
   showSwarm() {
     const { episode } = this;
+    if (episode.room) return this.showWorld();
     const first = [episode.at("x", 0, 0), episode.at("y", 0, 0)];
     const low = [0, 0], high = [0, 0];
     const include = (x, y) => {
@@ -88,14 +89,14 @@ export class Camera {
 
   /** Half the drawn width and height, pixels: no object appears twice. */
   get halves() {
-    const { width, height } = this.episode;
-    return [Math.min(this.width, width * this.scale) / 2, Math.min(this.height, height * this.scale) / 2];
+    const { periodX, periodY } = this.episode;
+    return [Math.min(this.width, periodX * this.scale) / 2, Math.min(this.height, periodY * this.scale) / 2];
   }
 
   /** Calls `draw` with the pixels of every image of a place that is in view, or at most `radius`
    *  pixels outside. Their number is always small. */
   eachImage(x, y, radius, draw) {
-    const { width, height } = this.episode;
+    const { periodX: width, periodY: height } = this.episode;
     const { scale } = this;
     const [offX, offY] = [x - this.x, y - this.y];
     const halfX = (Math.min(this.width, width * scale) / 2 + radius) / scale;

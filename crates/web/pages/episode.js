@@ -1,5 +1,8 @@
 // A packed episode; crates/web/src/replay/mod.rs describes the format.
 
+/** Farther than anything in a world between walls, cm. */
+const BEYOND = 1e9;
+
 const ARRAYS = { i8: Int8Array, i16: Int16Array, i32: Int32Array, f32: Float32Array };
 
 /** Unpacks an episode from an ArrayBuffer or Uint8Array. */
@@ -24,6 +27,8 @@ export class Episode {
       }
       this.columns[place.name] = { values, scale: place.scale, n_rows: place.n_rows };
     }
+    // What lies this far apart is at the same place on a torus. Between walls, nothing is.
+    [this.periodX, this.periodY] = this.room ? [BEYOND, BEYOND] : [this.width, this.height];
     // The object of each robot.
     this.kinds = this.robots.flatMap((robots) => Array(robots.n).fill(robots));
     this.has_targets = this.columns.target.values.some((target) => target >= 0);
@@ -63,11 +68,20 @@ export class Episode {
     const [x, y, heading] = [xs.values[at] * xs.scale, ys.values[at] * ys.scale, headings.values[at] * headings.scale];
     if (share === 0 || step + 1 >= this.steps) return { x, y, heading };
     const turn = shortest(headings.values[at + 1] * headings.scale - heading, 2 * Math.PI);
-    const dx = shortest(xs.values[at + 1] * xs.scale - x, this.width);
-    const dy = shortest(ys.values[at + 1] * ys.scale - y, this.height);
+    const dx = shortest(xs.values[at + 1] * xs.scale - x, this.periodX);
+    const dy = shortest(ys.values[at + 1] * ys.scale - y, this.periodY);
     // A robot that is moved elsewhere does not glide there.
     const part = Math.abs(dx) + Math.abs(dy) > 50 ? 0 : share;
     return { x: x + part * dx, y: y + part * dy, heading: heading + part * turn };
+  }
+
+  /** Position and heading of a movable; between steps, at a share of the way. */
+  movable(index, step, share = 0) {
+    const at = (name, step) => this.at(`movable_${name}`, index, step);
+    const [x, y, heading] = ["x", "y", "heading"].map((name) => at(name, step));
+    if (share === 0 || step + 1 >= this.steps) return { x, y, heading };
+    const turn = shortest(at("heading", step + 1) - heading, 2 * Math.PI);
+    return { x: x + share * (at("x", step + 1) - x), y: y + share * (at("y", step + 1) - y), heading: heading + share * turn };
   }
 
   /** The distance at which a robot is heard, cm; 0 if it does not emit. */

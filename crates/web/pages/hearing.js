@@ -31,8 +31,8 @@ export function drawHearing(context, { camera, colors, episode, poses, radius, v
       if (!looks.has(key)) looks.set(key, { symbol, isOurs, path: new Path2D() });
       const { path } = looks.get(key);
       const [from, to] = [poses[emitter], poses[robot]];
-      const dx = shortest(to.x - from.x, episode.width) * camera.scale;
-      const dy = -shortest(to.y - from.y, episode.height) * camera.scale;
+      const dx = shortest(to.x - from.x, episode.periodX) * camera.scale;
+      const dy = -shortest(to.y - from.y, episode.periodY) * camera.scale;
       const length = Math.hypot(dx, dy);
       if (length < 2 * radius) continue;
       camera.eachImage(from.x, from.y, length, (sx, sy) => {

@@ -35,7 +35,7 @@ function addTrail(context, camera, episode, robot, { x, y }, step, first) {
   const { values: xs, scale: unit } = episode.columns.x;
   const { values: ys } = episode.columns.y;
   const { scale } = camera;
-  const { width, height } = episode;
+  const { periodX: width, periodY: height } = episode;
   const start = robot * episode.steps;
   let [lastX, lastY, dx, dy, drawnX, drawnY, longest, n] = [x, y, 0, 0, 0, 0, 0, 0];
   let isJump = false;

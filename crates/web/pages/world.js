@@ -4,6 +4,7 @@ import { canvas } from "swarm/dom.js";
 import { Camera } from "swarm/camera.js";
 import { disc, palette } from "swarm/drawing.js";
 import { drawHearing } from "swarm/hearing.js";
+import { drawRoom, drawTouches } from "swarm/room.js";
 import { RobotPictures } from "swarm/robot-pictures.js";
 import { drawTrails } from "swarm/robot-trails.js";
 
@@ -115,10 +116,12 @@ export class World {
     context.fillRect(0, 0, width, height);
     this.drawPlane(context);
     this.drawPlaces(context);
+    if (episode.room) drawRoom(context, this);
     if (view.reach || view.robot !== null) this.drawReach(context);
     if (view.trails) drawTrails(context, this);
     if (view.radio) drawHearing(context, this);
     this.robots.draw(context, this);
+    if (episode.room) drawTouches(context, this);
     context.restore();
     this.drawRuler(context);
   }
@@ -145,7 +148,7 @@ export class World {
     if (100 * camera.scale > 12) lines(100, 100);
     context.strokeStyle = colors.muted;
     context.setLineDash([2, 5]);
-    lines(episode.width, episode.height);
+    if (!episode.room) lines(episode.width, episode.height);
     context.setLineDash([]);
   }
 
@@ -153,7 +156,7 @@ export class World {
    *  where it is the nearest one; beyond, the next image is nearer. */
   drawPlaces(context) {
     const { camera, episode, view } = this;
-    const [halfX, halfY] = [(episode.width / 2) * camera.scale, (episode.height / 2) * camera.scale];
+    const [halfX, halfY] = [(episode.periodX / 2) * camera.scale, (episode.periodY / 2) * camera.scale];
     const eachOf = (name, discs, fill) => discs.forEach(({ range, color }, i) => {
       const [x, y] = ["x", "y"].map((axis) => episode.at(`${name}_${axis}`, i, view.step));
       const radius = range * camera.scale;
@@ -217,7 +220,10 @@ export class World {
     });
   }
 
+  /** Of a robot on the screen, pixels: to scale, if it has a body. */
   get radius() {
+    const { room } = this.episode;
+    if (room) return Math.max(2, room.radii[0] * this.camera.scale);
     return Math.max(RADIUS_MIN, Math.min(RADIUS * this.camera.scale, 26));
   }
 

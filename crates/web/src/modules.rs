@@ -52,6 +52,7 @@ modules!(
     "robot-panel.js",
     "robot-pictures.js",
     "robot-trails.js",
+    "room.js",
     "scales.js",
     "swept-values.js",
     "timeline.js",

@@ -18,11 +18,12 @@ mod room;
 mod shape;
 mod solver;
 
+use crate::record::Outline;
 use crate::torus::{Vec2, wrap_angle};
 
 use self::collision::Placed;
 pub(crate) use self::collision::Segment;
-pub(crate) use self::room::{Furnished, NoPlace, Placement, Room};
+pub(crate) use self::room::{Furnished, NoPlace, Room};
 pub(crate) use self::shape::Shape;
 use self::solver::{Candidate, Contact};
 
@@ -250,6 +251,14 @@ impl Bodies {
     /// Radius of a robot, cm.
     pub fn radius(&self, robot: usize) -> f64 {
         self.bodies[robot].shape.reach()
+    }
+
+    /// Outline of a body about its centre of mass, with heading 0.
+    fn outline(&self, body: usize) -> Outline {
+        match &self.bodies[body].shape {
+            Shape::Disc(radius) => Outline::Disc { center: Vec2::default(), radius: *radius },
+            Shape::Polygon(polygon) => Outline::Polygon(polygon.corners.clone()),
+        }
     }
 
     /// What a robot touches after the last step.

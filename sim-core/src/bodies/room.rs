@@ -8,6 +8,7 @@ use super::{Bodies, Chassis, Fixture, Form, Load, Pose};
 use crate::initializers::{Headings, Positions};
 use crate::objects::Site;
 use crate::problems::Problems;
+use crate::record::{Outline, RoomRecord};
 use crate::torus::{Torus, Vec2};
 use determinism::random::{Purpose, Stream};
 use experiment_file as file;
@@ -42,22 +43,22 @@ pub(crate) struct Things {
     /// Their numbers among all obstacles, or all movables.
     pub members: Range<usize>,
     headings: Headings,
-    /// Outline in the object's own frame, for those who draw it.
-    pub outline: Outline,
+    /// Contour in the object's own frame, for those who draw it.
+    pub outline: Contour,
     /// Properties of those that can be pushed.
     load: Option<Load>,
 }
 
 /// A disc's radius, or the corners of a polygon about its place, counter-clockwise; cm.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Outline {
+pub(crate) enum Contour {
     /// A disc.
     Disc(f64),
     /// A polygon.
     Polygon(Vec<Vec2>),
 }
 
-impl Outline {
+impl Contour {
     fn new(shape: &file::Shape) -> Self {
         match shape {
             file::Shape::Disc(radius) => Self::Disc(*radius),
@@ -74,31 +75,22 @@ impl Outline {
     }
 
     /// The same at a place.
-    fn placed(&self, pose: Pose) -> Placement {
+    fn placed(&self, pose: Pose) -> Outline {
         match self {
-            Self::Disc(radius) => Placement::Disc(pose.position, *radius),
+            Self::Disc(radius) => Outline::Disc { center: pose.position, radius: *radius },
             Self::Polygon(corners) => {
                 let axis = Vec2::unit(pose.heading);
                 let corners = corners.iter().map(|corner| pose.position + corner.rotated(axis));
-                Placement::Polygon(corners.collect())
+                Outline::Polygon(corners.collect())
             }
         }
     }
 }
 
-/// An outline in the world.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Placement {
-    /// Centre and radius of a disc.
-    Disc(Vec2, f64),
-    /// Corners.
-    Polygon(Vec<Vec2>),
-}
-
-impl Placement {
+impl Outline {
     fn contains(&self, place: Vec2) -> bool {
         match self {
-            Self::Disc(centre, radius) => (*centre - place).norm() < *radius,
+            Self::Disc { center, radius } => (*center - place).norm() < *radius,
             Self::Polygon(corners) => contains(corners, place),
         }
     }
@@ -106,8 +98,8 @@ impl Placement {
     fn fixtures(&self) -> Vec<Fixture> {
         let fixture = |form| Fixture { form, is_wall: false };
         match self {
-            Self::Disc(centre, radius) => {
-                vec![fixture(Form::Disc(*centre, Shape::Disc(*radius)))]
+            Self::Disc { center, radius } => {
+                vec![fixture(Form::Disc(*center, Shape::Disc(*radius)))]
             }
             Self::Polygon(corners) => sides(corners)
                 .map(|(from, to)| fixture(Form::Segment(Segment { from, to, inner: None })))
@@ -120,7 +112,7 @@ impl Placement {
 pub(crate) struct Furnished {
     pub bodies: Bodies,
     /// Obstacles in their order.
-    pub obstacles: Vec<Placement>,
+    pub obstacles: Vec<Outline>,
     /// Poses of robots, group by group.
     pub robots: Vec<Vec<Pose>>,
 }
@@ -164,14 +156,14 @@ impl Room {
                 }
                 file::ObjectConfig::Obstacle(obstacle) => {
                     let (n, outline) =
-                        (obstacle.num_instances, Outline::new(&obstacle.params.shape()));
+                        (obstacle.num_instances, Contour::new(&obstacle.params.shape()));
                     let starts = &obstacle.initializers;
                     let members = following(&room.obstacles, n);
                     let things = Things::new(index, name, members, starts, outline, None, problems);
                     room.obstacles.extend(things);
                 }
                 file::ObjectConfig::Movable(movable) => {
-                    let outline = Outline::new(&movable.params.shape());
+                    let outline = Contour::new(&movable.params.shape());
                     let file::MovableParams { mass, friction, .. } = movable.params;
                     let load = Load { shape: outline.shape(), mass, friction };
                     let (n, starts) = (movable.num_instances, &movable.initializers);
@@ -193,16 +185,26 @@ impl Room {
         Some(room)
     }
 
-    /// Boundary and walls, for those who draw them: the ends of each part.
-    pub fn walls(&self) -> impl Iterator<Item = (Vec2, Vec2)> {
-        self.walls.iter().filter_map(|fixture| match fixture.form {
-            Form::Segment(Segment { from, to, .. }) => Some((from, to)),
+    /// What those see who look at a trial.
+    pub fn record(&self, furnished: Furnished) -> RoomRecord {
+        let Furnished { bodies, obstacles, .. } = furnished;
+        let ends = |wall: &Fixture| match wall.form {
+            Form::Segment(Segment { from, to, .. }) => Some([from, to]),
             Form::Disc(..) => None,
-        })
+        };
+        // The boundary is first.
+        let walls = &self.walls[self.outline.len()..];
+        RoomRecord {
+            boundary: self.outline.clone(),
+            walls: walls.iter().filter_map(ends).collect(),
+            obstacles,
+            movables: bodies.loads().map(|load| bodies.outline(load)).collect(),
+            radii: (0..bodies.loads().start).map(|robot| bodies.radius(robot)).collect(),
+        }
     }
 
     /// Whether a place is within the boundary and in no obstacle.
-    fn has_ground_at(&self, place: Vec2, obstacles: &[Placement]) -> bool {
+    fn has_ground_at(&self, place: Vec2, obstacles: &[Outline]) -> bool {
         contains(&self.outline, place) && !obstacles.iter().any(|obstacle| obstacle.contains(place))
     }
 
@@ -211,7 +213,7 @@ impl Room {
     pub fn put(
         &self,
         bodies: &mut Bodies,
-        obstacles: &[Placement],
+        obstacles: &[Outline],
         movable: usize,
         pose: Pose,
     ) -> bool {
@@ -282,7 +284,7 @@ impl Things {
         name: &str,
         members: Range<usize>,
         starts: &file::BodyInitializers,
-        outline: Outline,
+        outline: Contour,
         load: Option<Load>,
         problems: &mut Problems,
     ) -> Option<Self> {
@@ -310,7 +312,7 @@ struct Placing<'a> {
     torus: &'a Torus,
     /// Fixtures, and everything else that must not be overlapped, as bodies.
     bodies: Bodies,
-    solids: Vec<Placement>,
+    solids: Vec<Outline>,
 }
 
 impl Placing<'_> {

@@ -10,10 +10,11 @@ use task_script::{Host, Meter, Name, Object, Value};
 
 use super::change::May;
 use super::names::Named;
-use crate::bodies::{Bodies, Placement};
+use crate::bodies::Bodies;
 use crate::border;
 use crate::communication::Mode;
 use crate::objects::{StaticObjects, Switches};
+use crate::record::Outline;
 use crate::swarm::Swarm;
 use crate::torus::{Vec2, wrap_angle};
 use crate::trial::Group;
@@ -79,7 +80,7 @@ pub(crate) struct View<'a> {
     pub areas: &'a mut [Vec2],
     pub switches: &'a mut Switches,
     /// Bodies and obstacles, in a world with them.
-    pub room: Option<&'a mut (Bodies, Vec<Placement>)>,
+    pub room: Option<&'a mut (Bodies, Vec<Outline>)>,
     /// Readings of robots, group by group.
     pub groups: &'a [Group],
     /// Environment step, from 0.

@@ -10,12 +10,12 @@ use clap::Args;
 use experiment_file::ExperimentConfig;
 use plotters::prelude::*;
 use png::{Compression, Filter, PixelDimensions, Unit};
-use sim_core::StepRecord;
+use sim_core::{RoomRecord, StepRecord};
 
 use self::{
     animation::{Frames, Palette},
     camera::Camera,
-    draw::Discs,
+    draw::Fixed,
 };
 use crate::{args::whole, error::Error};
 
@@ -97,6 +97,7 @@ impl FromStr for Moments {
 /// Some steps of an episode, to be drawn.
 struct Shown<'a> {
     config: &'a ExperimentConfig,
+    room: Option<&'a RoomRecord>,
     steps: &'a [StepRecord],
     range: RangeInclusive<usize>,
 }
@@ -104,6 +105,7 @@ struct Shown<'a> {
 impl<'a> Shown<'a> {
     fn new(
         config: &'a ExperimentConfig,
+        room: Option<&'a RoomRecord>,
         steps: &'a [StepRecord],
         moments: Option<Moments>,
     ) -> Result<Self, Error> {
@@ -113,7 +115,7 @@ impl<'a> Shown<'a> {
         if last as usize >= n_steps {
             return Err(Error::Input(format!("--at {last}: the episode has steps 0 to {end}")));
         }
-        Ok(Self { config, steps, range: first as usize..=last as usize })
+        Ok(Self { config, room, steps, range: first as usize..=last as usize })
     }
 
     fn n_frames(&self) -> usize {
@@ -121,7 +123,7 @@ impl<'a> Shown<'a> {
     }
 
     fn camera(&self, side: u32) -> Camera {
-        Camera::around(self.config, &self.steps[self.range.clone()], side)
+        Camera::around(self.config, self.room, &self.steps[self.range.clone()], side)
     }
 
     /// A step, and the steps of its trail.
@@ -133,10 +135,11 @@ impl<'a> Shown<'a> {
 /// The SVG of one step.
 pub fn svg(
     config: &ExperimentConfig,
+    room: Option<&RoomRecord>,
     steps: &[StepRecord],
     args: &PictureArgs,
 ) -> Result<Vec<u8>, Error> {
-    let shown = Shown::new(config, steps, args.at)?;
+    let shown = Shown::new(config, room, steps, args.at)?;
     if shown.n_frames() > 1 {
         return Err(Error::Input("an .svg shows one step; a .png may be animated".into()));
     }
@@ -145,8 +148,8 @@ pub fn svg(
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, (fine, fine)).into_drawing_area();
-        let (camera, discs) = (shown.camera(fine), Discs::new(config));
-        draw::draw(&area, fine, &camera, &discs, shown.way(*shown.range.end()))
+        let (camera, fixed) = (shown.camera(fine), Fixed::new(config, room));
+        draw::draw(&area, fine, &camera, &fixed, shown.way(*shown.range.end()))
             .map_err(internal)?;
     }
     // The drawing is fine; `width` and `height` set the shown size.
@@ -157,18 +160,19 @@ pub fn svg(
 /// The PNG of the requested steps of an episode, or of its last step without a request.
 pub fn png(
     config: &ExperimentConfig,
+    room: Option<&RoomRecord>,
     steps: &[StepRecord],
     args: &PictureArgs,
 ) -> Result<Vec<u8>, Error> {
-    let shown = Shown::new(config, steps, args.at)?;
+    let shown = Shown::new(config, room, steps, args.at)?;
     let n_frames = shown.n_frames();
     if n_frames > FRAMES_MAX {
         return Err(Error::Input(format!("an animation has at most {FRAMES_MAX} steps")));
     }
     let side = args.side(n_frames);
     let times = if n_frames > 1 { FINE_OF_ANIMATIONS } else { FINE };
-    let (camera, discs) = (shown.camera(side * times), Discs::new(config));
-    let frame = |step: usize| smooth(side, times, &camera, &discs, shown.way(step));
+    let (camera, fixed) = (shown.camera(side * times), Fixed::new(config, room));
+    let frame = |step: usize| smooth(side, times, &camera, &fixed, shown.way(step));
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, side, side);
     encoder.set_depth(png::BitDepth::Eight);
@@ -207,14 +211,14 @@ fn smooth(
     side: u32,
     times: u32,
     camera: &Camera,
-    discs: &Discs,
+    fixed: &Fixed<'_>,
     way: &[StepRecord],
 ) -> Result<Vec<u8>, Error> {
     let fine = side * times;
     let mut drawn = vec![0; 3 * (fine as usize).pow(2)];
     {
         let area = BitMapBackend::with_buffer(&mut drawn, (fine, fine)).into_drawing_area();
-        draw::draw(&area, fine, camera, discs, way).map_err(internal)?;
+        draw::draw(&area, fine, camera, fixed, way).map_err(internal)?;
     }
     let (side, times) = (side as usize, times as usize);
     let mut pixels = Vec::with_capacity(3 * side * side);

@@ -79,6 +79,7 @@ struct Rows<W> {
     has_voltages: bool,
     has_frames: bool,
     has_targets: bool,
+    has_bodies: bool,
     n_rows: u64,
 }
 
@@ -123,6 +124,7 @@ impl<W: io::Write> Rows<W> {
             has_voltages: config.topology.neuron_model.is_spiking(),
             has_frames: wants(ExtraColumns::Frames),
             has_targets: wants(ExtraColumns::Targets),
+            has_bodies: config.world.bodies.is_some(),
             n_rows: 0,
         }
     }
@@ -146,6 +148,12 @@ impl<W: io::Write> Rows<W> {
             }
             row.extend(stimuli);
             row.extend(record.lights.iter().flat_map(|light| [number(light.x), number(light.y)]));
+            row.extend(record.movables.iter().flat_map(|movable| {
+                [movable.position.x, movable.position.y, movable.heading].map(number)
+            }));
+            if self.has_bodies {
+                row.push(u8::from(robot.touches).to_string());
+            }
             row.push(record.fitness.map(number).unwrap_or_default());
             row.extend(record.measures.values().copied().map(number));
             row.extend(self.extra_cells(robot));
@@ -190,6 +198,11 @@ impl<W: io::Write> Rows<W> {
         heading.extend(self.stimuli.iter().map(|input| quoted(&format!("stimulus_{input}"))));
         let light = |i| [format!("light_{i}_x_cm"), format!("light_{i}_y_cm")];
         heading.extend((0..record.lights.len()).flat_map(light));
+        let movable = |i| ["x_cm", "y_cm", "heading_rad"].map(|name| format!("movable_{i}_{name}"));
+        heading.extend((0..record.movables.len()).flat_map(movable));
+        if self.has_bodies {
+            heading.push("touches".into());
+        }
         heading.push("step_fitness".into());
         heading.extend(record.measures.keys().map(|name| format!("metric_{name}")));
         heading.extend(self.neurons.iter().map(|neuron| quoted(&format!("neuron_{neuron}"))));

@@ -14,7 +14,7 @@ use std::io::Write as _;
 use experiment_file::ExperimentConfig;
 use flate2::{Compression, write::GzEncoder};
 use serde::Serialize;
-use sim_core::{EpisodeSummary, EvaluateError, Simulation, StepRecord, TrialSet};
+use sim_core::{EpisodeSummary, EvaluateError, RoomRecord, Simulation, StepRecord, TrialSet};
 
 use self::{
     column::{Column, Form, Place},
@@ -96,7 +96,7 @@ impl Replay {
         keep_going: &dyn Fn() -> bool,
     ) -> Result<Self, ReplayError> {
         let Episode { simulation, genotype, trial_set, trial, .. } = *episode;
-        let scene = Scene::new(episode);
+        let scene = Scene::new(episode)?;
         let per_robot: usize =
             ROBOT_COLUMNS.iter().map(|column| (column.n_components)(&scene)).sum();
         let n_values = scene.steps as usize * scene.n_robots * per_robot;
@@ -143,6 +143,8 @@ struct Columns {
     robots: Vec<Column>,
     lights: [Column; 2],
     areas: [Column; 2],
+    /// What a world with bodies has in addition.
+    bodies: Option<BodyColumns>,
     fitness: Column,
     measures: Column,
     /// Scratch: a robot's values.
@@ -162,6 +164,7 @@ impl Columns {
             robots: ROBOT_COLUMNS.iter().map(of_robots).collect(),
             lights: [light("light_x"), light("light_y")],
             areas: [area("area_x"), area("area_y")],
+            bodies: scene.room.as_ref().map(|room| BodyColumns::new(room, n_steps)),
             fitness: Column::new("fitness", Form::Real, 1, n_steps),
             measures: Column::new("measures", Form::Real, scene.measure_names.len(), n_steps),
             values: Vec::new(),
@@ -188,6 +191,9 @@ impl Columns {
                 y.set(index, step, position.y);
             }
         }
+        if let Some(bodies) = &mut self.bodies {
+            bodies.record(step, record);
+        }
         self.fitness.set(0, step, record.fitness.unwrap_or(f64::NAN));
         for (row, name) in scene.measure_names.iter().enumerate() {
             let value = record.measures.get(name).copied().unwrap_or(f64::NAN);
@@ -196,9 +202,47 @@ impl Columns {
     }
 
     fn into_vec(self) -> Vec<Column> {
-        let Self { mut robots, lights, areas, fitness, measures, .. } = self;
+        let Self { mut robots, lights, areas, bodies, fitness, measures, .. } = self;
         robots.extend(lights.into_iter().chain(areas).chain([fitness, measures]));
+        robots.extend(
+            bodies
+                .into_iter()
+                .flat_map(|bodies| [bodies.touches].into_iter().chain(bodies.movables)),
+        );
         robots
+    }
+}
+
+/// What bodies do, step by step.
+struct BodyColumns {
+    touches: Column,
+    /// Coordinates and heading.
+    movables: [Column; 3],
+}
+
+impl BodyColumns {
+    fn new(room: &RoomRecord, n_steps: usize) -> Self {
+        let movable = |name, form| Column::new(name, form, room.movables.len(), n_steps);
+        Self {
+            touches: Column::new("touches", Form::Byte(1.0), room.radii.len(), n_steps),
+            movables: [
+                movable("movable_x", Form::Position),
+                movable("movable_y", Form::Position),
+                movable("movable_heading", robots::ANGLE),
+            ],
+        }
+    }
+
+    fn record(&mut self, step: usize, record: &StepRecord) {
+        for (index, robot) in record.robots.iter().enumerate() {
+            self.touches.set(index, step, robot.touches.into());
+        }
+        for (index, movable) in record.movables.iter().enumerate() {
+            let values = [movable.position.x, movable.position.y, movable.heading];
+            for (column, value) in self.movables.iter_mut().zip(values) {
+                column.set(index, step, value);
+            }
+        }
     }
 }
 

@@ -19,7 +19,7 @@ const SHARE: Form = Form::Byte(0.01);
 const NUMBER: Form = Form::Byte(1.0);
 const ROBOT: Form = Form::Short(1.0);
 /// The form of angles, in radians.
-const ANGLE: Form = Form::Short(0.001);
+pub const ANGLE: Form = Form::Short(0.001);
 
 /// A column of one value per robot.
 const fn one(name: &'static str, form: Form, read: fn(&RobotRecord, &mut Vec<f64>)) -> RobotColumn {

@@ -4,7 +4,7 @@ use experiment_file::{
     ExperimentConfig, ObjectConfig, RobotConfig, RobotController, Seed, SensorQuery,
 };
 use serde::Serialize;
-use sim_core::{MeasureName, TrialSet};
+use sim_core::{EvaluateError, MeasureName, RoomRecord, TrialSet};
 
 use super::Episode;
 use crate::trials::Trials;
@@ -38,6 +38,9 @@ pub struct Scene {
     ensembles: Vec<Rows>,
     pub lights: Vec<Disc>,
     pub areas: Vec<Disc>,
+    /// Of a world with bodies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub room: Option<RoomRecord>,
     pub measure_names: Vec<MeasureName>,
 }
 
@@ -80,7 +83,7 @@ pub struct Disc {
 
 impl Scene {
     /// The scene of an episode.
-    pub fn new(episode: &Episode<'_>) -> Self {
+    pub fn new(episode: &Episode<'_>) -> Result<Self, EvaluateError> {
         let config = episode.config;
         let robots: Vec<Robots> =
             config.robots().map(|(name, robot)| Robots::new(name, robot, config)).collect();
@@ -95,7 +98,7 @@ impl Scene {
             });
             each.collect()
         };
-        Self {
+        Ok(Self {
             name: episode.name.to_owned(),
             experiment: config.name.clone(),
             seed: Seed(config.seed),
@@ -132,8 +135,9 @@ impl Scene {
                 }
                 _ => None,
             }),
+            room: episode.simulation.room(episode.trial_set, episode.trial)?,
             measure_names: episode.simulation.measure_names().to_vec(),
-        }
+        })
     }
 }
 

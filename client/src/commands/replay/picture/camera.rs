@@ -1,13 +1,17 @@
 //! The part of the world that a picture shows.
 
 use experiment_file::ExperimentConfig;
-use sim_core::{StepRecord, Vec2};
+use sim_core::{RoomRecord, StepRecord, Vec2};
 
 /// Margin around all shown objects, cm.
 const MARGIN: f64 = 40.0;
+/// Margin around a room, as a share of its side.
+const MARGIN_OF_ROOM: f64 = 0.02;
+/// Farther than anything in a room, cm.
+const BEYOND: f64 = 1e9;
 
-/// The visible square of the plane. The plane is a torus: each object is drawn at its
-/// image nearest to the middle.
+/// The visible square of the plane. On a torus, each object is drawn at its image nearest to
+/// the middle.
 pub struct Camera {
     pub middle: Vec2,
     period: Vec2,
@@ -18,9 +22,22 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera that shows all robots and lights in some steps, but at most the whole world.
-    pub fn around(config: &ExperimentConfig, steps: &[StepRecord], pixels: u32) -> Self {
+    /// A camera that shows all robots and lights in some steps, at most the whole world; or all
+    /// of a room.
+    pub fn around(
+        config: &ExperimentConfig,
+        room: Option<&RoomRecord>,
+        steps: &[StepRecord],
+        pixels: u32,
+    ) -> Self {
         let period = Vec2::new(config.world.width, config.world.height);
+        let pixels = f64::from(pixels);
+        if room.is_some() {
+            let side = period.x.max(period.y) * (1.0 + 2.0 * MARGIN_OF_ROOM);
+            let middle = Vec2::new(0.5 * period.x, 0.5 * period.y);
+            let period = Vec2::new(BEYOND, BEYOND);
+            return Self { middle, period, scale: pixels / side, side: pixels };
+        }
         let places = || steps.iter().flat_map(places);
         let start = places().next().unwrap_or_default();
         let (mut low, mut high) = ([0.0_f64; 2], [0.0_f64; 2]);
@@ -38,7 +55,6 @@ impl Camera {
             start.x + f64::midpoint(low[0], high[0]),
             start.y + f64::midpoint(low[1], high[1]),
         );
-        let pixels = f64::from(pixels);
         Self { middle, period, scale: pixels / side, side: pixels }
     }
 

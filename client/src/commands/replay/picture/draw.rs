@@ -10,7 +10,7 @@ use plotters::{
     prelude::*,
     style::text_anchor::{HPos, Pos, VPos},
 };
-use sim_core::{Mode, RobotRecord, StepRecord};
+use sim_core::{Mode, Outline, RobotRecord, RoomRecord, StepRecord, Vec2};
 
 use super::camera::Camera;
 use crate::figure::{FONT, embed_font};
@@ -42,16 +42,19 @@ type Area<B> = DrawingArea<B, Shift>;
 type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 type Place = (i32, i32);
 
-/// Constants of all steps: the reach of areas and lights, cm, and their colours.
-pub struct Discs {
+/// Constants of all steps.
+pub struct Fixed<'a> {
+    /// Reach, cm, and colour.
     areas: Vec<(f64, RGBColor)>,
     lights: Vec<(f64, RGBColor)>,
+    /// Of a world with bodies.
+    room: Option<&'a RoomRecord>,
 }
 
-impl Discs {
+impl<'a> Fixed<'a> {
     /// The areas and lights, in the order of the records.
-    pub fn new(config: &ExperimentConfig) -> Self {
-        let mut discs = Self { areas: Vec::new(), lights: Vec::new() };
+    pub fn new(config: &ExperimentConfig, room: Option<&'a RoomRecord>) -> Self {
+        let mut discs = Self { areas: Vec::new(), lights: Vec::new(), room };
         for object in config.world.objects.values() {
             let (all, disc, n) = match object {
                 ObjectConfig::GroundArea(it) => {
@@ -89,19 +92,23 @@ pub fn draw<B: DrawingBackend>(
     area: &Area<B>,
     side: u32,
     camera: &Camera,
-    discs: &Discs,
+    fixed: &Fixed<'_>,
     way: &[StepRecord],
 ) -> Drawn<B> {
     let Some(now) = way.last() else { return Ok(()) };
     embed_font();
     let pen = Pen { area, camera, side, unit: f64::from(side) / POINTS };
     area.fill(&GROUND)?;
-    pen.places(discs, now)?;
+    pen.places(fixed, now)?;
     pen.grid()?;
+    if let Some(room) = fixed.room {
+        pen.room(room, now)?;
+    }
     pen.trails(way)?;
     pen.hearing(now)?;
-    for robot in &now.robots {
-        pen.robot(robot)?;
+    for (index, robot) in now.robots.iter().enumerate() {
+        let radius = fixed.room.map(|room| pen.pixels(room.radii[index]));
+        pen.robot(robot, radius.unwrap_or(pen.radius()))?;
     }
     pen.scale_bar()?;
     let style = pen.text(22.0).pos(Pos::new(HPos::Right, VPos::Bottom));
@@ -149,8 +156,8 @@ impl<B: DrawingBackend> Pen<'_, B> {
             && (from.0 - to.0).abs().max((from.1 - to.1).abs()) < self.side as i32 / 2
     }
 
-    fn places(&self, discs: &Discs, now: &StepRecord) -> Drawn<B> {
-        let pixels = |cm: f64| (cm * self.camera.scale).round() as i32;
+    fn places(&self, discs: &Fixed<'_>, now: &StepRecord) -> Drawn<B> {
+        let pixels = |cm: f64| self.pixels(cm);
         for ((reach, color), center) in discs.lights.iter().zip(&now.lights) {
             for (share, opacity) in GLOW {
                 self.disc(self.camera.place(*center), pixels(share * reach), color.mix(opacity))?;
@@ -164,6 +171,51 @@ impl<B: DrawingBackend> Pen<'_, B> {
             self.disc(self.camera.place(*center), self.px(6.0), color.mix(1.0))?;
         }
         Ok(())
+    }
+
+    fn pixels(&self, cm: f64) -> i32 {
+        (cm * self.camera.scale).round() as i32
+    }
+
+    /// Walls, what stands in the room, and what robots push.
+    fn room(&self, room: &RoomRecord, now: &StepRecord) -> Drawn<B> {
+        let still = (Vec2::default(), 0.0);
+        for obstacle in &room.obstacles {
+            self.outline(obstacle, still, WAY)?;
+        }
+        for (movable, record) in room.movables.iter().zip(&now.movables) {
+            self.outline(movable, (record.position, record.heading), LIGHT)?;
+        }
+        let wall = self.stroke(INK, 4.0);
+        let corners = room.boundary.iter().chain(room.boundary.first());
+        let boundary: Vec<Place> = corners.map(|corner| self.camera.place(*corner)).collect();
+        self.line(&boundary, wall)?;
+        for ends in &room.walls {
+            self.line(&ends.map(|end| self.camera.place(end)), wall)?;
+        }
+        Ok(())
+    }
+
+    /// A shape at a place, turned by a heading.
+    fn outline(&self, shape: &Outline, (at, heading): (Vec2, f64), color: RGBColor) -> Drawn<B> {
+        let (sin, cos) = libm::sincos(heading);
+        let placed = |corner: &Vec2| {
+            let x = at.x + cos * corner.x - sin * corner.y;
+            self.camera.place(Vec2::new(x, at.y + sin * corner.x + cos * corner.y))
+        };
+        match shape {
+            Outline::Disc { center, radius } => {
+                let (center, radius) = (placed(center), self.pixels(*radius));
+                self.disc(center, radius, color.mix(0.6))?;
+                self.area.draw(&Circle::new(center, radius, self.stroke(INK, 1.5)))
+            }
+            Outline::Polygon(corners) => {
+                let mut corners: Vec<Place> = corners.iter().map(placed).collect();
+                self.area.draw(&Polygon::new(corners.clone(), color.mix(0.6).filled()))?;
+                corners.extend(corners.first().copied());
+                self.line(&corners, self.stroke(INK, 1.5))
+            }
+        }
     }
 
     /// A line per metre.
@@ -236,9 +288,8 @@ impl<B: DrawingBackend> Pen<'_, B> {
         (RADIUS * self.camera.scale).clamp(least * self.unit, most * self.unit).round() as i32
     }
 
-    fn robot(&self, robot: &RobotRecord) -> Drawn<B> {
+    fn robot(&self, robot: &RobotRecord, radius: i32) -> Drawn<B> {
         let (x, y) = self.camera.place(robot.position);
-        let radius = self.radius();
         let times = |factor: f64| (factor * f64::from(radius)).round() as i32;
         let ring = |factor: f64, color: RGBColor| {
             self.area.draw(&Circle::new((x, y), times(factor), self.stroke(color, 2.0)))
@@ -260,6 +311,9 @@ impl<B: DrawingBackend> Pen<'_, B> {
                 let ends = [(x - radius, y - slope), (x + radius, y + slope)];
                 self.line(&ends, self.stroke(INK, 2.0))?;
             }
+        }
+        if robot.touches {
+            ring(1.0, FRAME)?;
         }
         if robot.carries {
             self.disc((x, y), times(0.5), TARGET.mix(1.0))?;
