@@ -137,7 +137,7 @@ fn a_replay_shows_robots_that_carry_something_or_have_failed() {
     let simulation = Simulation::compile(&config).unwrap();
     let genotype = vec![0.6; simulation.genotype_len()];
     let episode = evaluated(&config, &simulation, &genotype);
-    let scene = Scene::new(&episode);
+    let scene = Scene::new(&episode).unwrap();
     let mut columns = Columns::new(&scene);
     let simulated = simulation.simulate(&genotype, episode.trial_set, 0, &mut |step| {
         let mut step = step.clone();
@@ -155,4 +155,44 @@ fn a_replay_shows_robots_that_carry_something_or_have_failed() {
     };
     assert_eq!(marked("carries"), [(1, 7)]);
     assert_eq!(marked("failed"), [(3, 39)]);
+}
+
+/// Robots that drive straight on, behind a box and in front of a wall.
+const PUSHING: &str = r#"{
+  "task": {"script": {"name": "push.star", "text":
+    "def control(robot):\n    robot.left = 1\n    robot.right = 1\n\ndef fitness(world):\n    return world.movables[0].x"}},
+  "algorithm": {"name": "SNES", "evolvable_object": "robot", "population_size": 10, "generations": 1,
+    "evaluation_steps": 20, "num_evaluations": 1,
+    "populations": {"all": {"objects": ["synapses:weights:all"], "min_vals": -1, "max_vals": 1}}},
+  "topology": {"stimuli": {"I": {"n": 8, "sensor": "proximity_sensor"}}, "ensembles": {"O": {"n": 2}},
+    "synapses": {"s": {"pre": "I", "post": "O"}}, "outputs": {"w": {"ensemble": "O", "actuator": "wheel_actuator"}},
+    "decoding": {"w": {"scheme": "IdentityDecoding"}}},
+  "world": {"width": 200, "height": 100, "boundary": "walls", "bodies": {}, "objects": {
+    "robot": {"type": "robot", "num_instances": 2, "controller": "script_controller",
+      "sensors": {"proximity_sensor": {}}, "actuators": {"wheel_actuator": {}},
+      "initializers": {"positions": {"name": "fixed", "params": {"values": [[30, 46], [30, 54]]}},
+        "orientations": {"name": "fixed", "params": {"values": [[0]]}}}},
+    "box": {"type": "movable", "num_instances": 1, "params": {"corners": [[0, 0], [20, 0], [20, 20], [0, 20]], "mass": 0.2},
+      "initializers": {"positions": {"name": "fixed", "params": {"values": [[60, 50]]}}}},
+    "pillar": {"type": "obstacle", "num_instances": 1, "params": {"radius": 5},
+      "initializers": {"positions": {"name": "fixed", "params": {"values": [[150, 20]]}}}},
+    "wall": {"type": "wall", "corners": [[120, 70], [120, 100]]}}}
+}"#;
+
+#[test]
+fn a_replay_of_bodies_has_the_room_and_what_moves_in_it() {
+    let (config, _) = ExperimentConfig::from_json(PUSHING, "pushing", evolution::ALGORITHMS).unwrap();
+    let simulation = Simulation::compile(&config).unwrap();
+    let genotype = vec![0.5; simulation.genotype_len()];
+    let episode = evaluated(&config, &simulation, &genotype);
+    let (header, body) = unpack(&Replay::simulate(&episode).unwrap().encode());
+    let room = &header["room"];
+    assert_eq!(room["boundary"].as_array().unwrap().len(), 4);
+    assert_eq!(room["walls"][0][1]["y"], 100.0);
+    assert_eq!(room["obstacles"][0]["disc"]["center"]["x"], 150.0);
+    assert_eq!(room["movables"][0]["polygon"][0]["x"], -10.0, "about its centre of mass");
+    assert_eq!(room["radii"][1], 3.5);
+    let [x, touches] = ["movable_x", "touches"].map(|name| values(&header, &body, name));
+    assert!(x[0] == 60.0 && x[19] > 70.0, "the box moves: {x:?}");
+    assert_eq!((touches[0], touches[19]), (0.0, 1.0));
 }
