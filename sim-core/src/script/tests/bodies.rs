@@ -4,15 +4,16 @@ use determinism::Isa;
 use experiment_file::ExperimentConfig;
 use serde_json::{Value, json};
 
-use super::acting::{controlled, watch};
+use super::acting::{controlled, failure, watch};
 use super::measured;
 use crate::simulation::Simulation;
 
-/// A room of 200 x 200 cm, whose robots this script controls: their places and headings. In it
-/// are a box of 10 x 10 cm at (70, 100), a post at (150, 50) and a wall from (20, 160) to (180,
-/// 160).
+/// A room of 200 x 200 cm with a box of 10 x 10 cm at (70, 100), a post at (150, 50) and a wall
+/// from (20, 160) to (180, 160). The script controls its robots, which are given as x, y and
+/// heading; without `control` they stand.
 fn room(text: &str, n_steps: u32, robots: &[[f64; 3]]) -> ExperimentConfig {
-    let mut file = serde_json::to_value(controlled(text, n_steps)).unwrap();
+    let stand = if text.contains("def control") { "" } else { STAND };
+    let mut file = serde_json::to_value(controlled(&format!("{text}{stand}"), n_steps)).unwrap();
     let fixed = |values: Value| json!({"name": "fixed", "params": {"values": values}});
     let world = &mut file["world"];
     (world["width"], world["height"]) = (json!(200), json!(200));
@@ -39,6 +40,8 @@ fn room(text: &str, n_steps: u32, robots: &[[f64; 3]]) -> ExperimentConfig {
     ExperimentConfig::from_json(&file.to_string(), "t", evolution::ALGORITHMS).unwrap().0
 }
 
+const STAND: &str = "\ndef control(robot):\n    return\n";
+
 /// Robots that drive straight on.
 const DRIVE: &str = "
 def control(robot):
@@ -57,7 +60,8 @@ def fitness(world):
         fail('names', box.id, box.group)
     if box.distance(pusher) != world.distance((pusher.x, pusher.y), (box.x, box.y)):
         fail('distance')
-    if abs(pusher.bearing(box)) > 1e-6 or box.neighbours(20) != [pusher] * (box.distance(pusher) <= 20):
+    near = [pusher] if box.distance(pusher) <= 20 else []
+    if abs(pusher.bearing(box)) > 1e-6 or box.neighbours(20) != near:
         fail('near', pusher.bearing(box))
     if world.step == 0 and (pusher.touches or (box.x, box.y, box.heading) != (70, 100, 0)):
         fail('start', box.x, box.y, box.heading)
@@ -68,10 +72,6 @@ def fitness(world):
         fail('queue', len(first.touches), len(second.touches))
     return box.state['most']
 "
-    );
-    let text = text.replace(
-        "[pusher] * (box.distance(pusher) <= 20)",
-        "([pusher] if box.distance(pusher) <= 20 else [])",
     );
     let pi = std::f64::consts::PI;
     let robots = [[50.0, 100.0, 0.0], [10.0, 20.0, pi], [20.0, 20.0, pi]];
@@ -151,6 +151,24 @@ def fitness(world):
 }
 
 #[test]
+fn walls_and_obstacles_are_between_places_and_movables_are_not() {
+    let text = "
+def fitness(world):
+    a, b = world.robots
+    box = world.movables[0]
+    for start, end, expected in [
+        (a, b, True), (b, a, True), (a, box, False), ((5, 150), (5, 170), False),
+        ((60, 100), (80, 100), False), ((140, 50), (160, 50), True), ((150, 30), (150, 40), False),
+        (a, a, False), (a, (-10, 100), True),
+    ]:
+        if world.walls_between(start, end) != expected:
+            fail('between', expected)
+    return 1
+";
+    watch(&room(text, 2, &[[100.0, 100.0, 0.0], [100.0, 180.0, 0.0]]));
+}
+
+#[test]
 fn scripts_for_worlds_with_bodies_run_without_them() {
     let text = "
 def control(robot):
@@ -165,4 +183,39 @@ def fitness(world):
     return a.left
 ";
     assert_eq!(watch(&controlled(text, 3))[2].fitness, Some(1.0));
+}
+
+#[test]
+fn what_goes_wrong_says_where_and_why() {
+    let fitness = "def fitness(world):\n    return 1\n";
+    let put = "t.star:2: `place` puts movables elsewhere, not ";
+    for (body, reason) in [
+        ("world.place(world.robots[0], (1, 1))", &*format!("{put}a robot")),
+        ("world.place(world, (1, 1))", &format!("{put}the world")),
+        ("world.place((1, 1), (1, 1))", &format!("{put}a tuple")),
+        ("world.place(world.movables[0], 1)", "a point is a thing or `(x, y)`, not a int"),
+        ("world.place(world.movables[0], (0 * math.inf, 1))", "two finite numbers"),
+        (
+            "world.place(world.movables[0], (1, 1), math.inf)",
+            "a heading is a finite number, not inf",
+        ),
+        ("world.place(world.movables[0])", "the world has no `place` of 1 arguments"),
+        ("world.movables[0].x = 3", "`x` of a movable cannot be changed here; `react` sets"),
+        ("world.movables[0].on", "a movable has no `on`"),
+        ("world.movables[0].range", "a movable has no `range`"),
+        ("world.movables[0].touches", "a movable has no `touches`"),
+        ("world.walls_between(world.robots[0])", "no `walls_between` of 1 arguments"),
+        ("world.movables.append(1)", "t.star:2: "),
+        (
+            "[0 for i in range(999) for j in range(999) if world.place(world.movables[0], (1, 1))]",
+            "does too much",
+        ),
+    ] {
+        let text = format!("def react(world):\n    {body}\n{fitness}");
+        let error = failure(&room(&text, 3, &[[100.0, 100.0, 0.0]]));
+        assert!(error.starts_with("t.star:2: ") && error.contains(reason), "{body}: {error}");
+    }
+    let text = "def fitness(world):\n    world.place(world.movables[0], (30, 30))";
+    let error = failure(&room(text, 3, &[[100.0, 100.0, 0.0]]));
+    assert!(error.contains("t.star:2: only `react` puts movables elsewhere"), "{error}");
 }
