@@ -17,6 +17,7 @@ use experiment_file::{
     ExperimentConfig, FitnessFunction, LightController, ObjectConfig, RobotController,
     ScriptConfig, TaskConfig,
 };
+use serde_json::json;
 use sim_core::{EvaluateError, Simulation};
 
 /// Valid scripts, each with its experiment.
@@ -71,8 +72,43 @@ fn scripts() -> Vec<(String, ExperimentConfig)> {
         }
         scripts.push((format!("{text}\n{}", read(&by_hand)), config));
     }
+    let (_, config) = experiment(&tasks.join("dispersion.star"));
+    scripts.push((PUSHES.to_owned(), with_bodies(&config)));
     scripts
 }
+
+/// The same experiment between walls, with movables and obstacles.
+fn with_bodies(config: &ExperimentConfig) -> ExperimentConfig {
+    let mut file = serde_json::to_value(config).unwrap();
+    let world = &mut file["world"];
+    (world["boundary"], world["bodies"]) = ("walls".into(), json!({}));
+    let uniform = json!({"name": "random_uniform", "params": {"low": 100, "high": 500, "size": 2}});
+    for (name, params) in [("movable", json!({"mass": 0.1})), ("obstacle", json!({}))] {
+        world["objects"][name] = json!({
+            "type": name, "num_instances": 3, "initializers": {"positions": uniform}, "params": params,
+        });
+    }
+    for robot in config.world.objects.keys() {
+        world["objects"][robot]["controller"] = "script_controller".into();
+    }
+    ExperimentConfig::from_json(&file.to_string(), "hostile", evolution::ALGORITHMS).unwrap().0
+}
+
+/// Robots that push boxes, which are put elsewhere again.
+const PUSHES: &str = "
+def control(robot):
+    box = robot.world.movables[robot.id % 3]
+    robot.left = 1 if robot.bearing(box) < 0 else 0.5
+    robot.right = 0 if None in robot.touches else 0.8
+
+def react(world):
+    for box in world.movables:
+        if box.distance(world.center) < 100 and not world.walls_between(box, world.center):
+            world.place(box, (600 * world.random(), 600 * world.random()), box.heading + 1)
+
+def fitness(world):
+    return sum([len(robot.touches) + robot.distance(world.movables[0]) for robot in world.robots])
+";
 
 /// Robots that turn towards received frames, and fail at random.
 const ACTS: &str = "
