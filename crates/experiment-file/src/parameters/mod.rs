@@ -86,9 +86,9 @@ pub enum Domain {
     /// A list of at most this many lists of numbers. Other parts of the file determine the length
     /// of each.
     Vectors(usize),
-    /// A list of so many points `[x, y]`, at least and at most.
+    /// A list of points `[x, y]`, with its smallest and its largest length.
     Points(usize, usize),
-    /// The one whole number that other parts of the file leave.
+    /// The only whole number that other parts of the file allow.
     Certain,
     /// A name, or a list of them.
     Names,

@@ -7,7 +7,7 @@ use crate::{
     BodyConfig, RobotConfig, RobotController, RobotInitializers, limits, parameters, sensors,
 };
 
-/// Reads a robot. `center`: of the world. `has_bodies`: whether every robot has one.
+/// Reads a robot. `center`: the centre of the world. `has_bodies`: whether every robot has one.
 pub(super) fn robot(
     o: &mut Object<'_>,
     center: [f64; 2],

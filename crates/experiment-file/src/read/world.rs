@@ -38,7 +38,7 @@ fn object(
     let kind = o.required("type").one_of(&KNOWN, &[]);
     if !matches!(kind, Some("wall" | "obstacle" | "movable")) {
         for key in ["positions", "orientations"] {
-            o.ignored(key, "`initializers` say where objects start");
+            o.ignored(key, "`initializers` determine where objects start");
         }
     }
     match kind {
@@ -127,7 +127,8 @@ fn body_initializers(o: &mut Object<'_>, center: [f64; 2]) -> BodyInitializers {
     })
 }
 
-/// Reads start positions. `center`: of the world, the default centre of arrangements.
+/// Reads start positions. `center`: the centre of the world, which is the default centre of
+/// arrangements.
 pub(super) fn positions(node: Node<'_>, center: [f64; 2]) -> Initializer {
     let choice = Choice::any::<Initializer>(&["grid_graph"]);
     let centers = [("center", center.into()), ("initial_pos", center.into())];

@@ -181,7 +181,8 @@ const PUSHING: &str = r#"{
 
 #[test]
 fn a_replay_of_bodies_has_the_room_and_what_moves_in_it() {
-    let (config, _) = ExperimentConfig::from_json(PUSHING, "pushing", evolution::ALGORITHMS).unwrap();
+    let (config, _) =
+        ExperimentConfig::from_json(PUSHING, "pushing", evolution::ALGORITHMS).unwrap();
     let simulation = Simulation::compile(&config).unwrap();
     let genotype = vec![0.5; simulation.genotype_len()];
     let episode = evaluated(&config, &simulation, &genotype);
