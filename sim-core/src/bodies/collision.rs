@@ -28,7 +28,8 @@ pub(super) struct Placed<'a> {
 pub(crate) struct Segment {
     pub from: Vec2,
     pub to: Vec2,
-    /// Unit vector to the side on which bodies are; `None`: they may be on both.
+    /// Unit vector to the side on which all bodies are, also beyond the segment's ends; `None`:
+    /// they may be on both sides.
     pub inner: Option<Vec2>,
 }
 
@@ -72,9 +73,12 @@ pub(super) fn with_segment(
                 take(touch);
             }
         }
-        Shape::Polygon(polygon) => {
-            polygons(&Outline::new(a, polygon), &Outline::of_segment(segment), within, take);
-        }
+        Shape::Polygon(polygon) => match segment.inner {
+            Some(inner) => polygon_and_half_plane(a, polygon, segment.from, inner, within, take),
+            None => {
+                polygons(&Outline::new(a, polygon), &Outline::of_segment(segment), within, take);
+            }
+        },
     }
 }
 
@@ -87,19 +91,42 @@ fn discs(a: Vec2, radius: f64, b: Vec2, other: f64) -> Touch {
 
 fn disc_and_segment(centre: Vec2, radius: f64, segment: &Segment) -> Touch {
     let (from, along) = (segment.from, segment.to - segment.from);
-    let share = (centre - from).dot(along) / along.dot(along);
-    if let Some(inner) = segment.inner
-        && (0.0..=1.0).contains(&share)
-    {
+    if let Some(inner) = segment.inner {
         let gap = (centre - from).dot(inner) - radius;
         return Touch { normal: -inner, point: centre - inner * radius, gap };
     }
+    let share = (centre - from).dot(along) / along.dot(along);
     let nearest = from + along * share.clamp(0.0, 1.0);
     let way = nearest - centre;
     let distance = way.norm();
     let normal =
         if distance > 0.0 { way * (1.0 / distance) } else { along.unit_or_zero().turned_right() };
     Touch { normal, point: centre + normal * radius, gap: distance - radius }
+}
+
+/// The polygon's deepest corner in a half-plane that begins at `from`, and the deeper one of the
+/// corners beside it.
+fn polygon_and_half_plane(
+    a: Placed<'_>,
+    polygon: &Polygon,
+    from: Vec2,
+    inner: Vec2,
+    within: f64,
+    take: &mut impl FnMut(Touch),
+) {
+    let n = polygon.corners.len();
+    let corner = |index: usize| a.position + polygon.corners[index].rotated(a.axis);
+    let gap = |index: usize| (corner(index) - from).dot(inner);
+    let deepest = farthest((0..n).map(|index| -gap(index)));
+    let beside = [(deepest + n - 1) % n, (deepest + 1) % n];
+    let beside = if gap(beside[0]) < gap(beside[1]) { beside[0] } else { beside[1] };
+    // In the order of the corners, so that each keeps its number from substep to substep.
+    for index in [deepest.min(beside), deepest.max(beside)] {
+        let gap = gap(index);
+        if gap <= within {
+            take(Touch { normal: -inner, point: corner(index), gap });
+        }
+    }
 }
 
 /// `polygon` is the shape of `b`.

@@ -138,6 +138,17 @@ impl Fixture {
     /// Its lowest and highest coordinates.
     fn bounds(&self) -> (Vec2, Vec2) {
         match &self.form {
+            // All beyond a side of a rectangle: who was pressed into a corner still meets both.
+            Form::Segment(Segment { from, inner: Some(inner), .. }) => {
+                let end = |coordinate: f64, inner: f64| {
+                    // 1 and -1 may be rounded.
+                    let low = if inner < -0.5 { coordinate } else { f64::NEG_INFINITY };
+                    let high = if inner > 0.5 { coordinate } else { f64::INFINITY };
+                    (low, high)
+                };
+                let (x, y) = (end(from.x, inner.x), end(from.y, inner.y));
+                (Vec2::new(x.0, y.0), Vec2::new(x.1, y.1))
+            }
             Form::Segment(Segment { from, to, .. }) => (
                 Vec2::new(from.x.min(to.x), from.y.min(to.y)),
                 Vec2::new(from.x.max(to.x), from.y.max(to.y)),
@@ -162,9 +173,13 @@ pub(crate) struct Bodies {
     duration: f64,
     /// Bodies in the order of their left ends, which changes little from step to step.
     by_left_end: Vec<usize>,
+    /// Where each body was when candidates were found, and how far it may go from there, cm.
+    searched: Vec<(Vec2, f64)>,
     candidates: Vec<Candidate>,
     contacts: Vec<Contact>,
     bumps: Vec<Bump>,
+    /// Whether a load has moved in this step.
+    loads_moved: bool,
 }
 
 impl Bodies {
@@ -178,9 +193,11 @@ impl Bodies {
             n_substeps,
             duration: step_duration / f64::from(n_substeps),
             by_left_end: Vec::new(),
+            searched: Vec::new(),
             candidates: Vec::new(),
             contacts: Vec::new(),
             bumps: Vec::new(),
+            loads_moved: false,
         }
     }
 
@@ -317,30 +334,33 @@ impl Bodies {
         self.bodies[robot].asked = (speed, turning);
     }
 
-    /// One environment step; returns whether a load may have moved.
+    /// One environment step; returns whether a load has moved.
     pub fn step(&mut self) -> bool {
+        self.loads_moved = false;
         self.find_candidates();
-        for _ in 0..self.n_substeps {
+        for substep in 0..self.n_substeps {
+            if substep > 0 && self.outruns_candidates() {
+                self.find_candidates();
+            }
             self.find_contacts();
             self.solve_velocities();
             self.advance();
             self.push_apart();
         }
-        // The axes of robots are products of rotations, which drift.
+        // The axes of bodies are products of rotations, which drift; also of those that turned and
+        // came to rest within the step.
         for body in &mut self.bodies {
-            if !body.is_at_rest() {
-                body.heading = wrap_angle(body.heading);
-                body.axis = Vec2::unit(body.heading);
-            }
+            body.heading = wrap_angle(body.heading);
+            body.axis = Vec2::unit(body.heading);
         }
         self.find_bumps();
-        let mut loads = self.bodies[self.n_robots..].iter();
-        loads.any(|load| !load.is_at_rest())
+        self.loads_moved
     }
 
     /// Moves every body for one substep by its velocity: a robot along the exact arc of its wheels.
     fn advance(&mut self) {
         let duration = self.duration;
+        self.loads_moved |= self.bodies[self.n_robots..].iter().any(|load| !load.is_at_rest());
         for body in self.bodies.iter_mut().filter(|body| !body.is_at_rest()) {
             let half = 0.5 * body.turning * duration;
             if half == 0.0 {

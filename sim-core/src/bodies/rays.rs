@@ -79,7 +79,8 @@ impl Bodies {
 }
 
 impl Sight<'_> {
-    /// The part of `way` up to the first thing; `None` if there is none.
+    /// The part of `way` up to the first thing; `None` if there is none. From inside of a polygon,
+    /// its far side is seen: begin at a robot's centre, as its rim may be in what it touches.
     pub fn along(&self, from: Vec2, way: Vec2) -> Option<f64> {
         let ray = Ray { from, way };
         let fixtures = self.fixtures.iter().filter_map(|fixture| ray.to_fixture(fixture));

@@ -15,6 +15,8 @@ use experiment_file as file;
 
 /// Most places that are drawn for an object.
 const N_DRAWS_MAX: usize = 1_000;
+/// Most comparisons of a place with a thing that may be there, in a trial: some seconds.
+const N_COMPARISONS_MAX: usize = 1_000_000_000;
 /// Most times that all objects of an arrangement are drawn together.
 const N_ARRANGEMENTS_MAX: usize = 100;
 
@@ -234,6 +236,7 @@ impl Room {
             torus,
             bodies: Bodies::new(self.walls.clone(), 1, 1.0),
             solids: Vec::new(),
+            n_comparisons: 0,
         };
         let streams = |site: &Site| {
             [Purpose::Positions, Purpose::Orientations].map(|purpose| stream(purpose, site.object))
@@ -313,6 +316,7 @@ struct Placing<'a> {
     /// Fixtures, and everything else that must not be overlapped, as bodies.
     bodies: Bodies,
     solids: Vec<Outline>,
+    n_comparisons: usize,
 }
 
 impl Placing<'_> {
@@ -341,7 +345,11 @@ impl Placing<'_> {
                         break true;
                     }
                     match site.positions.draw_one(self.torus, &mut positions) {
-                        Some(position) if n_draws < N_DRAWS_MAX => pose.position = position,
+                        Some(position)
+                            if n_draws < N_DRAWS_MAX && self.n_comparisons < N_COMPARISONS_MAX =>
+                        {
+                            pose.position = position;
+                        }
                         _ => break false,
                     }
                     n_draws += 1;
@@ -355,7 +363,7 @@ impl Placing<'_> {
                 return Ok(poses);
             }
             index = index.max(poses.len());
-            if !site.positions.is_arrangement() {
+            if !site.positions.is_arrangement() || self.n_comparisons >= N_COMPARISONS_MAX {
                 break;
             }
         }
@@ -364,6 +372,7 @@ impl Placing<'_> {
 
     /// Whether a body is in the room and overlaps nothing; then it stays there.
     fn has_room_for(&mut self, shape: &Shape, pose: Pose) -> bool {
+        self.n_comparisons += self.bodies.n_things();
         let is_free = self.room.has_ground_at(pose.position, &self.solids)
             && self.bodies.is_free(shape, pose);
         if is_free {

@@ -93,7 +93,8 @@ pub(crate) fn sides(corners: &[Vec2]) -> impl Iterator<Item = (Vec2, Vec2)> {
 
 /// Twice the area of a polygon; negative if its corners go round clockwise.
 fn twice_the_area(corners: &[Vec2]) -> f64 {
-    sides(corners).map(|(a, b)| a.cross(b)).sum()
+    let origin = corners[0];
+    sides(corners).map(|(a, b)| (a - origin).cross(b - origin)).sum()
 }
 
 /// Whether a simple polygon contains a point.
@@ -106,10 +107,15 @@ pub(crate) fn contains(corners: &[Vec2], point: Vec2) -> bool {
     sides(corners).filter(crosses).count() % 2 == 1
 }
 
+/// By triangles about the first corner: about a distant origin, their areas would cancel out.
 fn centroid(corners: &[Vec2]) -> Vec2 {
-    let mut sum = Vec2::default();
+    let origin = corners[0];
+    let (mut sum, mut twice_the_area) = (Vec2::default(), 0.0);
     for (a, b) in sides(corners) {
-        sum = sum + (a + b) * a.cross(b);
+        let (a, b) = (a - origin, b - origin);
+        let cross = a.cross(b);
+        sum = sum + (a + b) * cross;
+        twice_the_area += cross;
     }
-    sum * (1.0 / (3.0 * twice_the_area(corners)))
+    origin + sum * (1.0 / (3.0 * twice_the_area))
 }

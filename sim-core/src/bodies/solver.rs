@@ -83,16 +83,25 @@ pub(super) fn meet(body: Placed<'_>, fixture: &Fixture, within: f64, take: &mut 
 impl Bodies {
     /// Finds all pairs that may meet within this step.
     pub(super) fn find_candidates(&mut self) {
-        let Self { bodies, fixtures, bounds, by_left_end, candidates, .. } = self;
-        // Contacts make no body faster than the fastest.
-        let fastest = bodies.iter().map(|body| body.velocity.norm().max(body.asked.0.abs()));
-        let fastest = fastest.fold(0.0, f64::max);
-        let reach = fastest * self.duration * f64::from(self.n_substeps) + MARGIN;
-        let left_end = |body: &Body| body.position.x - body.shape.reach();
+        let Self { bodies, fixtures, bounds, by_left_end, candidates, searched, .. } = self;
+        let asked = bodies.iter().map(|body| body.asked.0.abs()).fold(0.0, f64::max);
+        let step = self.duration * f64::from(self.n_substeps);
+        let is_new = searched.len() != bodies.len();
+        searched.clear();
+        searched.extend(bodies.iter().map(|body| {
+            // Others may push it as fast as the fastest robot drives.
+            let reach = body.velocity.norm().max(asked) * step + MARGIN;
+            (body.position, reach)
+        }));
+        let extent = |body: usize| bodies[body].shape.reach() + searched[body].1;
+        let left_end = |body: usize| bodies[body].position.x - extent(body);
+        if is_new {
+            by_left_end.sort_by(|&a, &b| left_end(a).total_cmp(&left_end(b)).then(a.cmp(&b)));
+        }
         // Insertion, because the order is nearly right.
         for sorted in 1..by_left_end.len() {
             let mut place = sorted;
-            let key = |body: usize| (left_end(&bodies[body]), body);
+            let key = |body: usize| (left_end(body), body);
             while place > 0 && key(by_left_end[place - 1]) > key(by_left_end[place]) {
                 by_left_end.swap(place - 1, place);
                 place -= 1;
@@ -101,14 +110,13 @@ impl Bodies {
         candidates.clear();
         for (place, &first) in by_left_end.iter().enumerate() {
             let body = &bodies[first];
-            let right_end = body.position.x + body.shape.reach() + 2.0 * reach;
+            let right_end = body.position.x + extent(first);
             for &second in &by_left_end[place + 1..] {
-                let other = &bodies[second];
-                if left_end(other) > right_end {
+                if left_end(second) > right_end {
                     break;
                 }
-                let within = body.shape.reach() + other.shape.reach() + 2.0 * reach;
-                let way = other.position - body.position;
+                let within = extent(first) + extent(second);
+                let way = bodies[second].position - body.position;
                 if way.dot(way) <= within * within {
                     let (first, second) = (first.min(second), first.max(second));
                     let second = Other::Body(second);
@@ -116,10 +124,15 @@ impl Bodies {
                 }
             }
         }
+        let widest = (0..bodies.len()).map(|body| 2.0 * extent(body)).fold(0.0, f64::max);
         for (number, (low, high)) in bounds.iter().enumerate() {
-            for (first, body) in bodies.iter().enumerate() {
-                let Vec2 { x, y } = body.position;
-                let within = body.shape.reach() + reach;
+            let start = by_left_end.partition_point(|&body| left_end(body) < low.x - widest);
+            for &first in &by_left_end[start..] {
+                if left_end(first) > high.x {
+                    break;
+                }
+                let Vec2 { x, y } = bodies[first].position;
+                let within = extent(first);
                 if x + within >= low.x
                     && x - within <= high.x
                     && y + within >= low.y
@@ -132,6 +145,15 @@ impl Bodies {
         }
         debug_assert_eq!(fixtures.len(), bounds.len());
         candidates.sort_unstable_by_key(|candidate| (candidate.second, candidate.first));
+    }
+
+    /// Whether a body may go farther in the next substep than the candidates allow for: between
+    /// others, a light body slips out faster than anything drives.
+    pub(super) fn outruns_candidates(&self) -> bool {
+        self.bodies.iter().zip(&self.searched).any(|(body, &(from, reach))| {
+            let way = body.velocity.norm() * self.duration;
+            (body.position - from).norm() + way > reach
+        })
     }
 
     /// Finds where candidates may meet within this substep, and begins with the impulses of the
@@ -217,7 +239,7 @@ impl Bodies {
 
     /// Pushes overlapping bodies apart: robots give way to other bodies, and all to walls.
     pub(super) fn push_apart(&mut self) {
-        let Self { bodies, fixtures, candidates, contacts, n_robots, .. } = self;
+        let Self { bodies, fixtures, candidates, contacts, n_robots, loads_moved, .. } = self;
         for pass in 0..N_POSITION_PASSES {
             let sideways = if pass < ALL_GIVE_WAY_FROM { SIDEWAYS } else { 1.0 };
             let mut is_done = true;
@@ -258,14 +280,19 @@ impl Bodies {
                     Other::Body(second) => {
                         let [own, other] =
                             [first, second].map(|body| bodies[body].mobility(normal, sideways));
-                        own / (own + other)
+                        let share = own / (own + other);
+                        // Light things between robots and a wall have nowhere to go.
+                        let is_load = first < *n_robots && second >= *n_robots;
+                        if is_load { share.max(0.5) } else { share }
                     }
                 };
                 let way = normal * gap;
                 bodies[first].position = bodies[first].position + way * share;
                 if let Other::Body(second) = second {
                     bodies[second].position = bodies[second].position - way * (1.0 - share);
+                    *loads_moved |= second >= *n_robots && share < 1.0;
                 }
+                *loads_moved |= first >= *n_robots;
             }
             if is_done {
                 break;

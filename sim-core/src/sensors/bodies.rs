@@ -54,9 +54,10 @@ impl Sensor for ProximitySensor {
         let axis = Vec2::unit(from.heading);
         for (ray, reading) in self.rays.iter().zip(reading) {
             let direction = ray.rotated(axis);
-            let rim = from.position + direction * radius;
-            if let Some(part) = sight.along(rim, direction * self.range) {
-                *reading = 1.0 - part;
+            let reach = radius + self.range;
+            // Not from the rim, which overlaps by a hair what the robot leans on.
+            if let Some(part) = sight.along(from.position, direction * reach) {
+                *reading = 1.0 - (part * reach - radius).max(0.0) / self.range;
             }
         }
     }

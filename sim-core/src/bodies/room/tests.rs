@@ -184,6 +184,27 @@ fn rays_read_the_distance_from_the_rim() {
 }
 
 #[test]
+fn who_leans_on_something_sees_it() {
+    let line = json!([[113.5, 0], [113.5, 150]]);
+    let block = json!({"corners": [[0, -20], [8, -20], [8, 20], [0, 20]]});
+    for (name, thing) in [
+        ("line", json!({"type": "wall", "corners": line})),
+        ("obstacle", fixed("obstacle", [113.5, 75.0], block.clone())),
+        ("movable", fixed("movable", [113.5, 75.0], block)),
+    ] {
+        let mut world = one_robot(json!({"thing": thing}));
+        world["algorithm"]["evaluation_steps"] = json!(20);
+        let simulation = compiled(&world);
+        // Straight on at full speed.
+        let genotype = vec![1.0; simulation.genotype_len()];
+        let mut stimuli = Vec::new();
+        let look = &mut |step: &StepRecord| stimuli = step.robots[0].stimuli.clone();
+        simulation.simulate(&genotype, TrialSet::Generation(0), 0, look).unwrap();
+        assert!(stimuli[0] > 0.999 && stimuli[6] == 1.0, "{name}: {stimuli:?}");
+    }
+}
+
+#[test]
 fn rays_meet_only_what_the_sensor_sees() {
     let mut world = one_robot(json!({
         "wall": {"type": "wall", "corners": [[113.5, 0], [113.5, 150]]},
