@@ -56,7 +56,7 @@ macro_rules! scripted {
 }
 
 /// All examples, from the quickest to those that take minutes.
-pub const EXAMPLES: [Example; 15] = [
+pub const EXAMPLES: [Example; 20] = [
     built_in!("quickstart", "", "leader", "Five robots agree on a leader by radio, in seconds"),
     scripted!("dispersion", "Robots spread out; they sense how near others are"),
     scripted!("aggregation", "Robots gather; they sense where others are"),
@@ -70,6 +70,11 @@ pub const EXAMPLES: [Example; 15] = [
     scripted!("chain", "Robots connect two areas: each hears the next"),
     scripted!("division_of_labour", "Robots divide: half of them on each of two areas"),
     scripted!("synchronisation", "Robots flash together, without a clock that they share"),
+    scripted!("transport", "Robots with bodies push a box through a door; one cannot move it"),
+    scripted!("slalom", "Robots with bodies drive to a lamp behind a field of obstacles"),
+    scripted!("gather", "Robots with bodies gather in a room, with one bit of sight"),
+    scripted!("harvest", "Robots with bodies carry food through a door to a nest"),
+    scripted!("maze", "Robots with bodies explore a maze"),
     built_in!(
         "leader_selection_snes",
         "",

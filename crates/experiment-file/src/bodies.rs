@@ -120,8 +120,8 @@ parameters! {
     pub struct MovableParams: Default {
         /// Radius of a disc, cm.
         radius: Option<f64> = between(RADII, 10.0),
-        /// Corners `[x, y]` of a convex polygon around the movable's own position, cm, in either
-        /// order, instead of `radius`.
+        /// Corners `[x, y]` of a convex polygon, cm, in either order, instead of `radius`. The
+        /// polygon's centre of mass is at the movable's position.
         corners: Option<Vec<[f64; 2]>> =
             of(Domain::Points(3, limits::MOVABLE_CORNERS), Null).instead_of("radius"),
         /// Mass, kg.
