@@ -1,7 +1,8 @@
 //! Bodies: the boundary of the arena, walls, things that stand in the way, things that robots push.
 
-use schemars::{JsonSchema, Schema, json_schema};
+use schemars::{JsonSchema, json_schema};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::DefaultValue::{Null, Required};
 use crate::geometry::counter_clockwise;
@@ -110,8 +111,8 @@ parameters! {
     pub struct ObstacleParams: Default {
         /// Radius of a disc, cm.
         radius: Option<f64> = between(RADII, 10.0),
-        /// Corners `[x, y]` of a simple polygon around the obstacle's own position, cm, in either
-        /// order, instead of `radius`.
+        /// In place of `radius`, the corners `[x, y]` of a simple polygon around the obstacle's own
+        /// position, in either order, cm.
         corners: Option<Vec<[f64; 2]>> =
             of(Domain::Points(3, limits::CORNERS), Null).instead_of("radius"),
     }
@@ -120,7 +121,7 @@ parameters! {
     pub struct MovableParams: Default {
         /// Radius of a disc, cm.
         radius: Option<f64> = between(RADII, 10.0),
-        /// Corners `[x, y]` of a convex polygon, cm, in either order, instead of `radius`. The
+        /// In place of `radius`, the corners `[x, y]` of a convex polygon, in either order, cm. The
         /// polygon's centre of mass is at the movable's position.
         corners: Option<Vec<[f64; 2]>> =
             of(Domain::Points(3, limits::MOVABLE_CORNERS), Null).instead_of("radius"),
@@ -235,32 +236,30 @@ impl Sees {
 }
 
 const ALL: &str = "all";
+const NAMES_OF_SEES: [&str; 4] = [ALL, "robots", "walls", "objects"];
 
 /// `sees`
 pub(crate) const SEES: &Variants = &Variants {
     names: || &[ALL],
     read: |node| {
         if !node.is_list() {
-            return node.one_of(&[ALL, "robots", "walls", "objects"], &[]).map(Into::into);
+            return node.one_of(&NAMES_OF_SEES, &[]).map(Into::into);
         }
         let mut names: Vec<String> = Vec::new();
-        for node in node.list(1..=Sees::NAMES.len()) {
+        for node in node.list(1..=NAMES_OF_SEES.len()) {
             if let Some(name) = names.iter().find(|name| node.is(name)) {
                 node.problem(format!("names `{name}` twice"));
                 return None;
             }
-            names.push(node.one_of(&Sees::NAMES, &[])?.to_owned());
+            names.push(node.one_of(&NAMES_OF_SEES, &[])?.to_owned());
         }
         Some(names.into())
     },
-    schema: |_| schema_of_sees(),
+    schema: |_| {
+        let name = json!({"enum": NAMES_OF_SEES});
+        json_schema!({"anyOf": [name, list(name.clone(), 1, NAMES_OF_SEES.len())]})
+    },
 };
-
-fn schema_of_sees() -> Schema {
-    let [robots, walls, objects] = Sees::NAMES;
-    let listed = list(serde_json::json!({"enum": Sees::NAMES}), 1, Sees::NAMES.len());
-    json_schema!({"anyOf": [{"enum": [ALL, robots, walls, objects]}, listed]})
-}
 
 impl From<Sees> for ParameterValue {
     /// `"all"`, a name, or a list in a fixed order.

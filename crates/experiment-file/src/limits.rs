@@ -84,6 +84,8 @@ pub const STATIC_OBJECTS: u32 = 1_000;
 pub const OBSTACLES: u32 = 1_000;
 /// Corners of a polygon or of a line of walls.
 pub const CORNERS: usize = 64;
+/// Shortest edge, and smallest distance of a corner from another edge of a polygon, cm.
+pub const EDGE_MIN: f64 = 0.01;
 /// Corners of a movable.
 pub const MOVABLE_CORNERS: usize = 16;
 /// Radii of bodies, cm.
@@ -110,6 +112,7 @@ pub const NETWORK_STATES: u64 = 10_000_000;
 /// Robots x steps: the random draws of an episode.
 pub const ROBOT_STEPS: u64 = 20_000_000;
 /// Elementary operations of an episode. Every step of a robot has one per synapse and substep of
-/// the network, one per neuron and substep, one per sector and robot or light, and one per lattice
-/// point.
+/// the network, one per neuron and substep, one per sector or ray and robot, light or edge of a
+/// body, and one per lattice point. Every substep of the physics has 500 per body that moves, and
+/// one per such body and edge.
 pub const EPISODE_OPERATIONS: u64 = 1_000_000_000_000;

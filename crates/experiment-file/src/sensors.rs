@@ -316,8 +316,8 @@ parameters! {
         angles: Option<Vec<f64>> = of(Domain::Numbers(1, limits::SECTORS as usize), Null)
             .null()
             .shown("null: evenly around the robot, the first one ahead"),
-        /// What the rays meet: `robots`, `walls` with the boundary, `objects`, which are obstacles
-        /// and movables, a list of these, or `all`.
+        /// What the rays meet: `robots`; `walls`, with the boundary; `objects`, which are obstacles
+        /// and movables; a list of these; or `all`.
         sees: Sees = of(Domain::Variant(SEES), Name("all")),
         /// Standard deviation of the Gaussian noise.
         noise_sigma: f64 = amount(0.0),

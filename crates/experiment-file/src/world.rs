@@ -18,8 +18,8 @@ parameters! {
         height: f64 = between([1.0, limits::MAGNITUDE], 1000.0),
         /// Width W (x axis), cm.
         width: f64 = between([1.0, limits::MAGNITUDE], 1000.0),
-        /// What is at the edge: nothing, as on a torus; walls along the rectangle; or walls along
-        /// a simple polygon in it, which this lists the corners `[x, y]` of, cm.
+        /// What is at the edge of the world: nothing, as on a torus; walls along the rectangle; or
+        /// walls through the corners `[x, y]` of a simple polygon in it, cm.
         boundary: Boundary = of(Domain::Variant(BOUNDARY), Name("torus")).recent(),
         /// Makes bodies of robots, which then block each other and push movables. Needs a
         /// `boundary` of walls.

@@ -2,8 +2,9 @@
 
 use serde_json::Value;
 
-const UNITS: [&str; 12] = [
-    "cm", "cm/s", "ms", "1/ms", "s", "steps", "substeps", "radians", "mV", "mM", "mS/cm2", "uF/cm2",
+const UNITS: [&str; 14] = [
+    "cm", "cm/s", "ms", "1/ms", "s", "steps", "substeps", "radians", "mV", "mM", "mS/cm2",
+    "uF/cm2", "kg", "N",
 ];
 
 /// The parts that `Parameter::description` has put together.

@@ -94,6 +94,7 @@ pub const GROUPS: &[Group] = &[
 
 const WORLD: &[Section] = &[
     at("world", &[("WorldConfig", "")]),
+    at("world.bodies", &[("BodiesConfig", "")]),
     at("world.objects.NAME", &[("ObjectConfig", "")]),
     at(
         "initializers",
@@ -103,6 +104,8 @@ const WORLD: &[Section] = &[
             ("PositionInitializers", "ground_area"),
             ("PositionInitializers", "food_area"),
             ("PositionInitializers", "nest"),
+            ("BodyInitializers", "obstacle"),
+            ("BodyInitializers", "movable"),
         ],
     ),
     at("initializers.positions", &[("Initializer", "")]),
@@ -112,10 +115,13 @@ const WORLD: &[Section] = &[
             ("RobotParams", "robot"),
             ("LightParams", "light_source"),
             ("GroundAreaParams", "ground_area"),
-            ("ObjectConfig/oneOf/3/properties/params", "food_area"),
-            ("ObjectConfig/oneOf/4/properties/params", "nest"),
+            ("ObstacleParams", "obstacle"),
+            ("MovableParams", "movable"),
+            ("ObjectConfig/oneOf/6/properties/params", "food_area"),
+            ("ObjectConfig/oneOf/7/properties/params", "nest"),
         ],
     ),
+    at("body of a robot", &[("BodyConfig", "")]),
     at("controller of a robot", &[("RobotController", "")]),
     at("controller of a light", &[("LightController", "")]),
 ];
@@ -128,6 +134,8 @@ const SENSORS: &[Section] = &[
     at("sensors.wireless_receiver", &[("WirelessReceiverConfig", "")]),
     at("sensors.neighborhood_pos_sensor", &[("NeighborhoodSensorConfig", "")]),
     at("sensors.script_sensor", &[("ScriptSensorConfig", "")]),
+    at("sensors.proximity_sensor", &[("ProximitySensorConfig", "")]),
+    at("sensors.contact_sensor", &[("ContactSensorConfig", "")]),
 ];
 
 const ACTUATORS: &[Section] = &[

@@ -2,8 +2,8 @@
 
 use crate::report::{Path, Report};
 use crate::{
-    AlgorithmDescription, ExperimentConfig, ObjectConfig, RobotConfig, RobotController,
-    SynapseModel, TopologyConfig, limits,
+    AlgorithmDescription, ExperimentConfig, ObjectConfig, RobotConfig, RobotController, Shape,
+    SynapseModel, TopologyConfig, WorldConfig, limits,
 };
 
 pub(super) fn check(
@@ -19,6 +19,8 @@ pub(super) fn check(
 
 /// Numbers that a worker keeps for a node of an encoder, in addition to one per substep.
 const STATES_PER_NODE: u64 = 8;
+/// Operations of a body that moves, in a substep of the physics.
+const OPERATIONS_PER_BODY: u64 = 500;
 /// Operations of an encoder's node in a substep: a random draw costs as many.
 const OPERATIONS_PER_NODE: u64 = 16;
 
@@ -159,21 +161,17 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
     let path = Path::from(["world", "objects"]);
     let algorithm = Path::from(["algorithm"]);
     let topology = Path::from(["topology"]);
-    let is_robot = |object: &&ObjectConfig| matches!(object, ObjectConfig::Robot(_));
-    let count = |object: &ObjectConfig| u64::from(object.num_instances());
-    let objects = config.world.objects.values();
-    let n_robots: u64 = objects.clone().filter(is_robot).map(count).sum();
-    let n_static_objects: u64 = objects.filter(|object| !is_robot(object)).map(count).sum();
+    let n_objects = NumberOfObjects::new(&config.world);
+    let NumberOfObjects { n_robots, n_static_objects, n_movables, n_obstacles, n_edges } =
+        n_objects;
     let n_steps = u64::from(config.algorithm.evaluation_steps);
-    limit(n_robots, limits::ROBOTS.into(), "robots", &path, &[], report);
-    limit(
-        n_static_objects,
-        limits::STATIC_OBJECTS.into(),
-        "lights and ground areas",
-        &path,
-        &[],
-        report,
-    );
+    for (n, max, what) in [
+        (n_robots, limits::ROBOTS, "robots"),
+        (n_static_objects, limits::STATIC_OBJECTS, "lights and ground areas"),
+        (n_obstacles + n_movables, limits::OBSTACLES, "walls, obstacles and movables"),
+    ] {
+        limit(n, max.into(), what, &path, &[], report);
+    }
 
     let states = n_robots * (network.n_inputs + network.n_states + network.n_learning_states);
     let what = "inputs and neurons of all robots";
@@ -183,7 +181,7 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
     let what = "steps of all robots per trial";
     limit(n_robots * n_steps, limits::ROBOT_STEPS, what, &steps_path, &[&path], report);
 
-    let n_sensed = n_robots + n_static_objects;
+    let n_sensed = n_robots + n_static_objects + n_edges;
     let of_robot = |robot: &RobotConfig| {
         let substep = network.n_synapses + network.n_neuron_operations;
         let think = match robot.controller {
@@ -195,11 +193,59 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
         let sense = n_sensed * u64::from(robot.sensors.n_sectors());
         u64::from(robot.num_instances) * (think + sense + n_lattice_points(robot))
     };
-    let per_step: u64 = config.robots().map(|(_, robot)| of_robot(robot)).sum();
+    let substeps = config.world.bodies.map_or(0, |bodies| u64::from(bodies.substeps));
+    let physics = substeps * (n_robots + n_movables) * (OPERATIONS_PER_BODY + n_edges);
+    let per_step = config.robots().map(|(_, robot)| of_robot(robot)).sum::<u64>() + physics;
     let cost = per_step.saturating_mul(n_steps);
     let what = "operations per episode";
-    let parts = [&path, &topology];
+    let parts = [&path, &topology, &Path::from(["world", "bodies"])];
     limit(cost, limits::EPISODE_OPERATIONS, what, &steps_path, &parts, report);
+}
+
+/// How many objects of each kind a world has.
+#[derive(Default)]
+struct NumberOfObjects {
+    n_robots: u64,
+    /// Lights and ground areas.
+    n_static_objects: u64,
+    n_movables: u64,
+    /// Walls and obstacles.
+    n_obstacles: u64,
+    /// Edges of the boundary, walls, obstacles and movables; a disc has one.
+    n_edges: u64,
+}
+
+impl NumberOfObjects {
+    fn new(world: &WorldConfig) -> Self {
+        let mut total = Self::default();
+        total.n_edges = world.outline().map_or(0, |corners| corners.len() as u64);
+        let n_edges = |shape| match shape {
+            Shape::Disc(_) => 1,
+            Shape::Polygon(corners) => corners.len() as u64,
+        };
+        for object in world.objects.values() {
+            let n = u64::from(object.num_instances());
+            match object {
+                ObjectConfig::Robot(_) => total.n_robots += n,
+                ObjectConfig::LightSource(_) | ObjectConfig::GroundArea(_) => {
+                    total.n_static_objects += n;
+                }
+                ObjectConfig::Wall(wall) => {
+                    total.n_obstacles += n;
+                    total.n_edges += wall.corners.len() as u64;
+                }
+                ObjectConfig::Obstacle(obstacle) => {
+                    total.n_obstacles += n;
+                    total.n_edges += n * n_edges(obstacle.params.shape());
+                }
+                ObjectConfig::Movable(movable) => {
+                    total.n_movables += n;
+                    total.n_edges += n * n_edges(movable.params.shape());
+                }
+            }
+        }
+        total
+    }
 }
 
 fn n_lattice_points(robot: &RobotConfig) -> u64 {

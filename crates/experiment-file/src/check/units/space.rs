@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use super::{Doubts, step};
 use crate::report::Path;
 use crate::{
-    FitnessParams, Initializer, LightController, MovableConfig, ObjectConfig, ObstacleConfig,
-    OrbitConfig, RobotConfig,
+    BodyConfig, FitnessParams, Initializer, LightController, MovableConfig, ObjectConfig,
+    ObstacleConfig, OrbitConfig, RobotConfig,
 };
 
 /// Range of plausible sides of a world for robots of some centimetres, cm.
@@ -20,6 +20,13 @@ const SPEED_MAX: f64 = 100.0;
 /// Distances between the wheels, cm: an e-puck has 5.3, a Pioneer 38.
 const AXLE_MIN: f64 = 0.5;
 const AXLE_MAX: f64 = 50.0;
+/// Radii of robots, cm: a Kilobot has 1.65, a Pioneer 22.
+const RADIUS_MIN: f64 = 0.5;
+const RADIUS_MAX: f64 = 50.0;
+/// Largest plausible mass of such robots and of what they push, kg.
+const MASS_MAX: f64 = 50.0;
+/// Largest plausible force of such robots, N.
+const FORCE_MAX: f64 = 200.0;
 /// Largest plausible angle of a light's orbit per step; with more, the light jumps.
 const ORBIT_MAX: f64 = 0.5;
 /// Largest plausible decay per cm: with more, nothing reaches the next robot.
@@ -62,10 +69,14 @@ pub(super) fn check(doubts: &Doubts<'_>) {
                 let step = doubts.longest_step();
                 reach(area.params.range, step, &path.key("params").key("range"), doubts);
             }
-            ObjectConfig::Obstacle(ObstacleConfig { initializers, .. })
-            | ObjectConfig::Movable(MovableConfig { initializers, .. }) => {
+            ObjectConfig::Obstacle(ObstacleConfig { initializers, .. }) => {
                 at(&initializers.positions, &positions, doubts);
                 headings(&initializers.orientations, &orientations, doubts);
+            }
+            ObjectConfig::Movable(MovableConfig { initializers, params, .. }) => {
+                at(&initializers.positions, &positions, doubts);
+                headings(&initializers.orientations, &orientations, doubts);
+                heavy(params.mass, &path.key("params").key("mass"), doubts);
             }
             ObjectConfig::Wall(_) => {}
         }
@@ -108,6 +119,14 @@ fn robot(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
             doubts.add(&path.key("decay_rho"), what, "per m instead of per cm");
         }
     }
+    if let Some(sensor) = &sensors.proximity_sensor {
+        let path = path.key("sensors").key("proximity_sensor");
+        reach(sensor.range, 0.0, &path.key("range"), doubts);
+        angles(sensor.angles.iter().flatten(), &path.key("angles"), doubts);
+    }
+    if let Some(body) = &robot.body {
+        self::body(body, &path.key("body"), doubts);
+    }
     if let Some(rotation) = &robot.perturbations.uncontrollable_rotation {
         let path = path.key("perturbations").key("uncontrollable_rotation").key("targets");
         angles(rotation.targets.iter(), &path, doubts);
@@ -131,6 +150,34 @@ fn robot(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
         doubts.add(&path.key("axle_length"), format!("{axle} cm between two wheels"), SMALLER);
     } else if axle < AXLE_MIN {
         doubts.add(&path.key("axle_length"), format!("{axle} cm between two wheels"), LARGER);
+    }
+}
+
+fn body(body: &BodyConfig, path: &Path, doubts: &Doubts<'_>) {
+    let &BodyConfig { radius, mass, push_force } = body;
+    if radius > RADIUS_MAX {
+        doubts.add(
+            &path.key("radius"),
+            format!("{radius} cm is more than such robots have"),
+            SMALLER,
+        );
+    } else if radius < RADIUS_MIN {
+        doubts.add(
+            &path.key("radius"),
+            format!("{radius} cm is less than such robots have"),
+            LARGER,
+        );
+    }
+    heavy(mass, &path.key("mass"), doubts);
+    if push_force > FORCE_MAX {
+        let what = format!("{push_force} N is more than such robots push with");
+        doubts.add(&path.key("push_force"), what, "mN instead of N");
+    }
+}
+
+fn heavy(mass: f64, path: &Path, doubts: &Doubts<'_>) {
+    if mass > MASS_MAX {
+        doubts.add(path, format!("{mass} kg"), "g instead of kg");
     }
 }
 

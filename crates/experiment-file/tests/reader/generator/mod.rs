@@ -2,12 +2,14 @@
 //! ways to damage them.
 
 mod algorithm;
+mod bodies;
 mod encoding;
 mod learning;
 mod network;
 mod world;
 
 use algorithm::algorithm;
+use bodies::add_bodies;
 use network::Network;
 use serde_json::{Map, Value, json};
 use world::Robot;
@@ -88,6 +90,9 @@ fn experiment_with(dice: &mut Dice, share_of_spiking: f64) -> Value {
     insert(&mut file, "algorithm", algorithm(dice, &robot, &network));
     insert(&mut file, "world", robot.world(dice));
     insert(&mut file, "topology", network.topology);
+    if dice.chance(0.25) {
+        add_bodies(dice, &mut file["world"]);
+    }
     file
 }
 
