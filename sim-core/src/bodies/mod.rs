@@ -402,4 +402,6 @@ impl Bodies {
 }
 
 #[cfg(test)]
+mod against_chipmunk;
+#[cfg(test)]
 mod tests;

@@ -8,11 +8,12 @@ use super::*;
 use crate::drive::Drive;
 use crate::torus::Torus;
 
-const ROBOT: Chassis = Chassis { radius: 3.5, mass: 0.15, push_force: 0.5, axle_length: 11.0 };
-const STEP: f64 = 0.33;
+pub(super) const ROBOT: Chassis =
+    Chassis { radius: 3.5, mass: 0.15, push_force: 0.5, axle_length: 11.0 };
+pub(super) const STEP: f64 = 0.33;
 
 /// A square room.
-fn room(side: f64) -> Bodies {
+pub(super) fn room(side: f64) -> Bodies {
     let corners =
         [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)].map(|(x, y)| Vec2::new(x, y));
     let walls = sides(&corners).map(|(from, to)| {
@@ -22,11 +23,11 @@ fn room(side: f64) -> Bodies {
     Bodies::new(walls.collect(), 4, STEP)
 }
 
-fn at(x: f64, y: f64, heading: f64) -> Pose {
+pub(super) fn at(x: f64, y: f64, heading: f64) -> Pose {
     Pose { position: Vec2::new(x, y), heading }
 }
 
-fn rectangle(width: f64, height: f64) -> Shape {
+pub(super) fn rectangle(width: f64, height: f64) -> Shape {
     let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
     Shape::polygon(&corners.map(|(x, y)| Vec2::new(x, y)))
 }
