@@ -114,5 +114,6 @@ pub const ROBOT_STEPS: u64 = 20_000_000;
 /// Elementary operations of an episode. Every step of a robot has one per synapse and substep of
 /// the network, one per neuron and substep, one per sector or ray and robot, light or edge of a
 /// body, and one per lattice point. Every substep of the physics has 500 per body that moves, and
-/// one per such body and edge.
+/// one per such body and edge. A line of sight to a light or to an emitter that something may block
+/// has one per edge and body.
 pub const EPISODE_OPERATIONS: u64 = 1_000_000_000_000;

@@ -2,8 +2,8 @@
 
 use crate::report::{Path, Report};
 use crate::{
-    AlgorithmDescription, ExperimentConfig, ObjectConfig, RobotConfig, RobotController, Shape,
-    SynapseModel, TopologyConfig, WorldConfig, limits,
+    AlgorithmDescription, BlockedBy, ExperimentConfig, ObjectConfig, RobotConfig, RobotController,
+    Shape, SynapseModel, TopologyConfig, WorldConfig, limits,
 };
 
 pub(super) fn check(
@@ -191,7 +191,16 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
             RobotController::BraitenbergLightFollower | RobotController::ScriptController => 0,
         };
         let sense = n_sensed * u64::from(robot.sensors.n_sectors());
-        u64::from(robot.num_instances) * (think + sense + n_lattice_points(robot))
+        // A line of sight to a light, or to a robot that is heard, meets every edge and body.
+        let light = robot.sensors.light_sensor.as_ref().map(|sensor| sensor.blocked_by);
+        let frames = robot.sensors.wireless_receiver.as_ref().map(|sensor| sensor.blocked_by);
+        let line = |blocked_by| match blocked_by {
+            None | Some(BlockedBy::Nothing) => 0,
+            Some(BlockedBy::Walls) => n_edges,
+            Some(BlockedBy::Bodies) => n_edges + n_robots + n_movables,
+        };
+        let look = n_static_objects * line(light) + n_robots * line(frames);
+        u64::from(robot.num_instances) * (think + sense + look + n_lattice_points(robot))
     };
     let substeps = config.world.bodies.map_or(0, |bodies| u64::from(bodies.substeps));
     let physics = substeps * (n_robots + n_movables) * (OPERATIONS_PER_BODY + n_edges);

@@ -193,7 +193,7 @@ fn what_goes_wrong_says_where_and_why() {
         ("world.place(world.robots[0], (1, 1))", &*format!("{put}a robot")),
         ("world.place(world, (1, 1))", &format!("{put}the world")),
         ("world.place((1, 1), (1, 1))", &format!("{put}a tuple")),
-        ("world.place(world.movables[0], 1)", "a point is a thing or `(x, y)`, not a int"),
+        ("world.place(world.movables[0], 1)", "a point is a thing or `(x, y)`, not an int"),
         ("world.place(world.movables[0], (0 * math.inf, 1))", "two finite numbers"),
         (
             "world.place(world.movables[0], (1, 1), math.inf)",
