@@ -322,7 +322,7 @@ const THINGS: &[(&str, &str)] = &[
     (r#"{OBSTACLE, AT, "params": {"radius": 700}}"#,
      ".params.radius: a disc of radius 700 cm does not fit between the walls of `world.boundary`"),
     (r#"{OBSTACLE, AT, "params": {"radius": 5, "corners": [[0, 0], [9, 0], [0, 9]]}}"#,
-     ".params.corners: `radius` says the same"),
+     ".params.corners: `radius` states the same quantity"),
     (r#"{OBSTACLE, AT, "params": {"corners": [[0, 0], [9, 9], [9, 0], [0, 9]]}}"#,
      ".params.corners[0]: the edge that begins here crosses the one that begins at [2]"),
     (r#"{OBSTACLE, AT, "params": {"corners": [[0, 0], [9, 0], [5000, 9]]}}"#,

@@ -121,7 +121,11 @@ fn robot(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
     }
     if let Some(sensor) = &sensors.proximity_sensor {
         let path = path.key("sensors").key("proximity_sensor");
-        reach(sensor.range, 0.0, &path.key("range"), doubts);
+        // Rays may well reach across the whole world.
+        if sensor.range < APART {
+            let what = format!("{} cm is less than a robot", sensor.range);
+            doubts.add(&path.key("range"), what, LARGER);
+        }
         angles(sensor.angles.iter().flatten(), &path.key("angles"), doubts);
     }
     if let Some(body) = &robot.body {
