@@ -45,8 +45,10 @@ export class Camera {
 
   /** Shows the whole world. */
   showWorld() {
-    const { width, height } = this.episode;
-    this.look(width / 2, height / 2, width, height);
+    const { room, width, height } = this.episode;
+    // Walls at the edge are seen whole.
+    const margin = room ? 1.04 : 1;
+    this.look(width / 2, height / 2, margin * width, margin * height);
   }
 
   /** Shows at least a rectangle of `across` x `along` around a centre, cm. */
