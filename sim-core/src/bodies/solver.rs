@@ -24,8 +24,6 @@ const MARGIN: f64 = 0.1;
 pub(super) struct Candidate {
     first: usize,
     second: Other,
-    /// Impulses of the last substep, to begin with.
-    impulses: [f64; 2],
 }
 
 /// The second of two things.
@@ -52,8 +50,8 @@ pub(super) struct Contact {
     mass: f64,
     /// Impulse so far, kg cm/s, at least 0.
     impulse: f64,
-    /// Its candidate, and its number there.
-    place: (usize, usize),
+    /// Number of its candidate.
+    candidate: usize,
 }
 
 impl Contact {
@@ -120,7 +118,7 @@ impl Bodies {
                 if way.dot(way) <= within * within {
                     let (first, second) = (first.min(second), first.max(second));
                     let second = Other::Body(second);
-                    candidates.push(Candidate { first, second, impulses: [0.0; 2] });
+                    candidates.push(Candidate { first, second });
                 }
             }
         }
@@ -139,7 +137,7 @@ impl Bodies {
                     && y - within <= high.y
                 {
                     let second = Other::Fixture(number);
-                    candidates.push(Candidate { first, second, impulses: [0.0; 2] });
+                    candidates.push(Candidate { first, second });
                 }
             }
         }
@@ -156,12 +154,11 @@ impl Bodies {
         })
     }
 
-    /// Finds where candidates may meet within this substep, and begins with the impulses of the
-    /// last one.
+    /// Finds where candidates may meet within this substep.
     pub(super) fn find_contacts(&mut self) {
         let Self { bodies, fixtures, candidates, contacts, duration, .. } = self;
         contacts.clear();
-        for (index, candidate) in candidates.iter_mut().enumerate() {
+        for (index, candidate) in candidates.iter().enumerate() {
             let body = &bodies[candidate.first];
             let mut fastest = body.velocity.norm().max(body.asked.0.abs())
                 + body.turning.abs() * body.shape.reach();
@@ -171,20 +168,12 @@ impl Bodies {
                     + other.turning.abs() * other.shape.reach();
             }
             let within = fastest * *duration + MARGIN;
-            let mut number = 0;
-            let impulses = candidate.impulses;
             let mut take = |touch: Touch| {
                 let second = match candidate.second {
                     Other::Body(second) => Some(second),
                     Other::Fixture(_) => None,
                 };
-                let contact = Contact::new(bodies, candidate.first, second, touch);
-                contacts.push(Contact {
-                    impulse: impulses[number],
-                    place: (index, number),
-                    ..contact
-                });
-                number += 1;
+                contacts.push(Contact::new(bodies, candidate.first, second, touch, index));
             };
             match candidate.second {
                 Other::Body(second) => {
@@ -195,16 +184,12 @@ impl Bodies {
                     meet(body.placed(), &fixtures[second], within, &mut take);
                 }
             }
-            candidate.impulses = [0.0; 2];
-        }
-        for contact in &*contacts {
-            contact.push(bodies, contact.impulse);
         }
     }
 
     /// Velocities that drives and friction can bring about, and by which no bodies overlap.
     pub(super) fn solve_velocities(&mut self) {
-        let Self { bodies, contacts, candidates, duration, n_robots, .. } = self;
+        let Self { bodies, contacts, duration, n_robots, .. } = self;
         let mut holds = vec![Hold::default(); bodies.len()];
         // Without contacts, one pass is exact.
         let n_passes = if contacts.is_empty() { 1 } else { N_VELOCITY_PASSES };
@@ -231,10 +216,6 @@ impl Bodies {
         for body in &mut bodies[..*n_robots] {
             body.velocity = body.axis * body.velocity.dot(body.axis);
         }
-        for contact in contacts {
-            let (candidate, number) = contact.place;
-            candidates[candidate].impulses[number] = contact.impulse;
-        }
     }
 
     /// Pushes overlapping bodies apart: robots give way to other bodies, and all to walls.
@@ -245,7 +226,7 @@ impl Bodies {
             let mut is_done = true;
             let mut last = usize::MAX;
             for contact in &*contacts {
-                let (index, _) = contact.place;
+                let index = contact.candidate;
                 if index == last {
                     continue;
                 }
@@ -302,7 +283,13 @@ impl Bodies {
 }
 
 impl Contact {
-    fn new(bodies: &[Body], first: usize, second: Option<usize>, touch: Touch) -> Self {
+    fn new(
+        bodies: &[Body],
+        first: usize,
+        second: Option<usize>,
+        touch: Touch,
+        candidate: usize,
+    ) -> Self {
         let Touch { normal, point, gap } = touch;
         let body = &bodies[first];
         let lever = (point - body.position).cross(normal);
@@ -315,7 +302,7 @@ impl Contact {
             resistance += body.inverse_mass + body.inverse_inertia * levers[1] * levers[1];
         }
         let mass = 1.0 / resistance;
-        Self { first, second, normal, gap, levers, mass, impulse: 0.0, place: (0, 0) }
+        Self { first, second, normal, gap, levers, mass, impulse: 0.0, candidate }
     }
 
     /// Speed at which the two approach each other, cm/s.
