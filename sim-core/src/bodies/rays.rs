@@ -52,7 +52,7 @@ impl Bodies {
     pub fn is_clear(&self, from: Vec2, to: Vec2, blocked_by: BlockedBy, ends: &[usize]) -> bool {
         let ray = Ray { from, way: to - from };
         let is_past_fixtures =
-            || !self.fixtures.iter().any(|fixture| ray.to_fixture(fixture).is_some());
+            || !self.fixtures.iter().any(|fixture| ray.until_fixture(fixture).is_some());
         let is_past_movers = || {
             let mut movers = (0..self.bodies.len()).filter(|body| !ends.contains(body));
             !movers.any(|body| self.meets(&ray, body).is_some())
@@ -72,8 +72,8 @@ impl Bodies {
             way: ray.way.unrotated(body.axis),
         };
         match &body.shape {
-            Shape::Disc(radius) => local.to_disc(Vec2::default(), *radius),
-            Shape::Polygon(polygon) => local.to_polygon(polygon),
+            Shape::Disc(radius) => local.until_disc(Vec2::default(), *radius),
+            Shape::Polygon(polygon) => local.until_polygon(polygon),
         }
     }
 }
@@ -83,22 +83,22 @@ impl Sight<'_> {
     /// its far side is seen: begin at a robot's centre, as its rim may be in what it touches.
     pub fn along(&self, from: Vec2, way: Vec2) -> Option<f64> {
         let ray = Ray { from, way };
-        let fixtures = self.fixtures.iter().filter_map(|fixture| ray.to_fixture(fixture));
+        let fixtures = self.fixtures.iter().filter_map(|fixture| ray.until_fixture(fixture));
         let movers = self.movers.iter().filter_map(|&body| self.bodies.meets(&ray, body));
         fixtures.chain(movers).min_by(f64::total_cmp)
     }
 }
 
 impl Ray {
-    fn to_fixture(&self, fixture: &Fixture) -> Option<f64> {
+    fn until_fixture(&self, fixture: &Fixture) -> Option<f64> {
         match &fixture.form {
-            Form::Segment(Segment { from, to, .. }) => self.to_segment(*from, *to),
-            Form::Disc(centre, shape) => self.to_disc(*centre, shape.reach()),
+            Form::Segment(Segment { from, to, .. }) => self.until_segment(*from, *to),
+            Form::Disc(centre, shape) => self.until_disc(*centre, shape.reach()),
         }
     }
 
     /// The part of the way to a segment, from 0 to 1.
-    fn to_segment(&self, from: Vec2, to: Vec2) -> Option<f64> {
+    fn until_segment(&self, from: Vec2, to: Vec2) -> Option<f64> {
         let along = to - from;
         let cross = self.way.cross(along);
         if cross == 0.0 {
@@ -109,7 +109,7 @@ impl Ray {
         ((0.0..=1.0).contains(&part) && (0.0..=1.0).contains(&share)).then_some(part)
     }
 
-    fn to_disc(&self, centre: Vec2, radius: f64) -> Option<f64> {
+    fn until_disc(&self, centre: Vec2, radius: f64) -> Option<f64> {
         let apart = centre - self.from;
         let length = self.way.dot(self.way);
         let middle = apart.dot(self.way) / length;
@@ -122,8 +122,8 @@ impl Ray {
         if is_inside { Some(0.0) } else { (0.0..=1.0).contains(&part).then_some(part) }
     }
 
-    fn to_polygon(&self, polygon: &Polygon) -> Option<f64> {
-        let parts = sides(&polygon.corners).filter_map(|(from, to)| self.to_segment(from, to));
+    fn until_polygon(&self, polygon: &Polygon) -> Option<f64> {
+        let parts = sides(&polygon.corners).filter_map(|(from, to)| self.until_segment(from, to));
         parts.min_by(f64::total_cmp)
     }
 }

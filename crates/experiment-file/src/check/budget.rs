@@ -226,8 +226,8 @@ struct NumberOfObjects {
 
 impl NumberOfObjects {
     fn new(world: &WorldConfig) -> Self {
-        let mut total = Self::default();
-        total.n_edges = world.outline().map_or(0, |corners| corners.len() as u64);
+        let n_edges = world.outline().map_or(0, |corners| corners.len() as u64);
+        let mut total = Self { n_edges, ..Self::default() };
         let n_edges = |shape| match shape {
             Shape::Disc(_) => 1,
             Shape::Polygon(corners) => corners.len() as u64,

@@ -11,12 +11,11 @@ pub(super) fn add_bodies(dice: &mut Dice, world: &mut Value) {
     let boundary = if dice.chance(0.5) { json!("walls") } else { corners };
     insert(world, "boundary", boundary);
     let objects = world["objects"].as_object_mut().unwrap();
-    let mut n_robots = 0;
     let mut has_wheels = false;
-    for robot in objects.values_mut().filter(|object| object["type"] == "robot") {
+    let robots = objects.values_mut().filter(|object| object["type"] == "robot");
+    for (number, robot) in (0_u8..).zip(robots) {
         has_wheels |= robot["actuators"].get("wheel_actuator").is_some();
-        let low = f64::from(n_robots) * 150.0;
-        n_robots += 1;
+        let low = f64::from(number) * 150.0;
         body(dice, robot);
         let params = match dice.below(3) {
             0 => {
