@@ -50,8 +50,6 @@ pub(super) struct Contact {
     mass: f64,
     /// Impulse so far, kg cm/s, at least 0.
     impulse: f64,
-    /// Number of its candidate.
-    candidate: usize,
 }
 
 impl Contact {
@@ -158,7 +156,7 @@ impl Bodies {
     pub(super) fn find_contacts(&mut self) {
         let Self { bodies, fixtures, candidates, contacts, duration, .. } = self;
         contacts.clear();
-        for (index, candidate) in candidates.iter().enumerate() {
+        for candidate in &*candidates {
             let body = &bodies[candidate.first];
             let mut fastest = body.velocity.norm().max(body.asked.0.abs())
                 + body.turning.abs() * body.shape.reach();
@@ -173,7 +171,7 @@ impl Bodies {
                     Other::Body(second) => Some(second),
                     Other::Fixture(_) => None,
                 };
-                contacts.push(Contact::new(bodies, candidate.first, second, touch, index));
+                contacts.push(Contact::new(bodies, candidate.first, second, touch));
             };
             match candidate.second {
                 Other::Body(second) => {
@@ -220,18 +218,12 @@ impl Bodies {
 
     /// Pushes overlapping bodies apart: robots give way to other bodies, and all to walls.
     pub(super) fn push_apart(&mut self) {
-        let Self { bodies, fixtures, candidates, contacts, n_robots, loads_moved, .. } = self;
+        let Self { bodies, fixtures, candidates, n_robots, loads_moved, .. } = self;
         for pass in 0..N_POSITION_PASSES {
             let sideways = if pass < ALL_GIVE_WAY_FROM { SIDEWAYS } else { 1.0 };
             let mut is_done = true;
-            let mut last = usize::MAX;
-            for contact in &*contacts {
-                let index = contact.candidate;
-                if index == last {
-                    continue;
-                }
-                last = index;
-                let Candidate { first, second, .. } = candidates[index];
+            // All candidates: a crowd pushes robots to where nothing was near. Fixtures are last.
+            for &Candidate { first, second } in &*candidates {
                 let mut worst: Option<Touch> = None;
                 let mut take = |touch: Touch| {
                     if worst.is_none_or(|worst| touch.gap < worst.gap) {
@@ -283,13 +275,7 @@ impl Bodies {
 }
 
 impl Contact {
-    fn new(
-        bodies: &[Body],
-        first: usize,
-        second: Option<usize>,
-        touch: Touch,
-        candidate: usize,
-    ) -> Self {
+    fn new(bodies: &[Body], first: usize, second: Option<usize>, touch: Touch) -> Self {
         let Touch { normal, point, gap } = touch;
         let body = &bodies[first];
         let lever = (point - body.position).cross(normal);
@@ -302,7 +288,7 @@ impl Contact {
             resistance += body.inverse_mass + body.inverse_inertia * levers[1] * levers[1];
         }
         let mass = 1.0 / resistance;
-        Self { first, second, normal, gap, levers, mass, impulse: 0.0, candidate }
+        Self { first, second, normal, gap, levers, mass, impulse: 0.0 }
     }
 
     /// Speed at which the two approach each other, cm/s.
