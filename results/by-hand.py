@@ -4,7 +4,7 @@
     results/by-hand.py [--trials N] [--record] [TASK...]
     results/by-hand.py [--trials N] --tune NAME=VALUE,VALUE... TASK
 
-For every TASK, by default all of configs/tasks/by_hand, evaluates results/champions/TASK-*.json, and the
+For every TASK, by default those of configs/tasks/by_hand with champions, evaluates results/champions/TASK-*.json, and the
 controller of configs/tasks/by_hand/TASK.star, on trials that no evolution uses. Prints means with
 their 95 % intervals: the fitness, and the share of the last third of an episode in which the task is solved,
 as its script defines it. For the tasks in FITNESS, the second number is the share of trials that reach this fitness.
@@ -118,7 +118,8 @@ def main():
     parser.add_argument("--tune", action="append", metavar="NAME=VALUE,VALUE", help="values of a constant")
     parser.add_argument("tasks", nargs="*", metavar="TASK")
     args = parser.parse_args()
-    tasks = args.tasks or sorted(path.stem for path in (TASKS / "by_hand").glob("*.star"))
+    written = sorted(path.stem for path in (TASKS / "by_hand").glob("*.star"))
+    tasks = args.tasks or [task for task in written if champions(task)]
     if args.tune:
         return tune(tasks[0], args.trials, args.tune)
     print("| task | controller | fitness | solved |\n|---|---|---|---|")
