@@ -234,7 +234,7 @@ pub fn print(
     print_of(target, outcome, |experiment| experiment, line, progress)
 }
 
-/// Like [`print`], for answers that contain an experiment.
+/// Like [`print()`], for answers that contain an experiment.
 pub fn print_of<T>(
     target: &Target,
     outcome: Outcome<T>,
