@@ -201,7 +201,7 @@ class Replays(BrowserTest):
                 const numbers = [1e-300, 1e-9, 1, 1e9, 1e300, Infinity];
                 let images = 0;
                 for (const world of numbers.slice(0, 5)) for (const radius of numbers) for (const size of [0, 1, 1000, 1e9]) {
-                    const episode = { width: world, height: world, n_robots: 0, steps: 0, lights: [], areas: [], at: () => 0 };
+                    const episode = { width: world, height: world, periodX: world, periodY: world, n_robots: 0, steps: 0, lights: [], areas: [], at: () => 0 };
                     const camera = new Camera(episode);
                     camera.resize(size, size);
                     let n = 0;
