@@ -105,7 +105,7 @@ class Lists(BrowserTest):
         self.assertEqual(asked, 0, "the whole list is asked for again")
         print(f"a click is answered within {statistics.median(answers):.0f} ms, at most {max(answers):.0f} ms")
 
-    def test_the_address_keeps_the_order_the_filter_and_the_columns_of_a_list(self):
+    def test_an_address_keeps_the_order_the_filter_and_the_columns_of_a_list(self):
         self.open("?q=group%3Djudged")
         self.assertEqual(self.ids(), list(range(N_JUDGED, 1, -1)))
         self.find("th [data-column=champion]").click()
