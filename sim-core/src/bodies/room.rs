@@ -45,7 +45,7 @@ pub(crate) struct Things {
     /// Their numbers among all obstacles, or all movables.
     pub members: Range<usize>,
     headings: Headings,
-    /// Contour in the object's own frame, for those who draw it.
+    /// Shape in the object's own frame.
     pub outline: Contour,
     /// Properties of those that can be pushed.
     load: Option<Load>,
@@ -178,7 +178,14 @@ impl Room {
                     let radius = robot.body.unwrap_or_default().radius;
                     room.largest_radius = room.largest_radius.max(radius);
                     if let Some(wheels) = &robot.actuators.wheel_actuator {
-                        room.step_duration = room.step_duration.max(wheels.step_duration);
+                        let (own, others) = (wheels.step_duration, room.step_duration);
+                        if others != 0.0 && own != others {
+                            problems.add(
+                                format!("world.objects.{name}.actuators.wheel_actuator.step_duration"),
+                                format!("is {own}, but {others} of other robots; bodies share their steps"),
+                            );
+                        }
+                        room.step_duration = own;
                     }
                 }
                 file::ObjectConfig::LightSource(_) | file::ObjectConfig::GroundArea(_) => {}
@@ -187,7 +194,7 @@ impl Room {
         Some(room)
     }
 
-    /// What those see who look at a trial.
+    /// The parts of a trial's room that do not move, and the shapes of those that do.
     pub fn record(&self, furnished: Furnished) -> RoomRecord {
         let Furnished { bodies, obstacles, .. } = furnished;
         let ends = |wall: &Fixture| match wall.form {

@@ -1,3 +1,5 @@
+//! The engine alone: drives, contacts, friction, crowds.
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use determinism::random::{Purpose, Stream, TrialSet};

@@ -1,3 +1,5 @@
+//! What a compiled experiment returns, and the calls that it refuses.
+
 use super::*;
 use crate::testing::{experiment_a, genotype, robot};
 use experiment_file::{GenotypeQuery, SynapseSelector};

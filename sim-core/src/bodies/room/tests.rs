@@ -1,3 +1,5 @@
+//! Rooms through experiments: starts, sensors, shadows, bits.
+
 use experiment_file::ExperimentConfig;
 use serde_json::{Value, json};
 
@@ -136,6 +138,20 @@ fn a_room_that_cannot_hold_its_robots_is_refused() {
     let (config, _) = ExperimentConfig::from_json(&text, "test", evolution::ALGORITHMS).unwrap();
     let error = Simulation::compile(&config).unwrap_err().to_string();
     assert!(error.contains("world.objects.robot.initializers.positions: no place for"), "{error}");
+}
+
+#[test]
+fn robots_whose_steps_last_differently_are_refused() {
+    let mut experiment = experiment();
+    let objects = experiment["world"]["objects"].as_object_mut().unwrap();
+    let mut slow = objects["robot"].clone();
+    slow["num_instances"] = json!(1);
+    slow["actuators"]["wheel_actuator"] = json!({"step_duration": 0.1});
+    objects.insert("slow".into(), slow);
+    let text = experiment.to_string();
+    let (config, _) = ExperimentConfig::from_json(&text, "test", evolution::ALGORITHMS).unwrap();
+    let error = Simulation::compile(&config).unwrap_err().to_string();
+    assert!(error.contains("wheel_actuator.step_duration: is 0."), "{error}");
 }
 
 /// A robot at (100, 75) that looks along x and stands still, between these other objects.
