@@ -106,11 +106,11 @@ export class Player {
       ...this.places("areas", "sees_areas"), ...this.places("lights", "sees_lights"));
   }
 
-  /** The areas and lights, and the robots that see them, unless all do. */
+  /** The areas and lights. If some robots have a sensor for them, and others have none, also the names of those that have. */
   places(name, sees) {
     const { robots } = this.episode;
     const seeing = robots.filter((it) => it[sees]).map((it) => it.name);
-    const who = seeing.length === robots.length ? "" : seeing.length ? `, seen by ${seeing.join(", ")}` : ", seen by no robot";
+    const who = [0, robots.length].includes(seeing.length) ? "" : `, seen by ${seeing.join(", ")}`;
     const kinds = Map.groupBy(this.episode[name], (it) => `${it.name} ${it.color}`);
     return [...kinds.values()].map((its) => {
       const mark = element("i", { className: name });
