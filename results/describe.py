@@ -10,6 +10,7 @@ nothing else.
 import argparse
 import json
 import zipfile
+from pathlib import Path
 
 METADATA = "ro-crate-metadata.json"
 
@@ -31,8 +32,9 @@ def main():
     for option in ("author", "orcid", "license"):
         parser.add_argument(f"--{option}", required=True)
     arguments = parser.parse_args()
-    # Mode x keeps a file that exists.
-    with zipfile.ZipFile(arguments.bundle) as bundle, zipfile.ZipFile(arguments.to, "x") as copy:
+    if Path(arguments.to).exists():
+        parser.error(f"{arguments.to} exists; name another file for the copy")
+    with zipfile.ZipFile(arguments.bundle) as bundle, zipfile.ZipFile(arguments.to, "w") as copy:
         for entry in bundle.infolist():
             data = bundle.read(entry)
             copy.writestr(entry, described(data, arguments) if entry.filename == METADATA else data)
