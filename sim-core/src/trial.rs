@@ -1,10 +1,11 @@
 //! One trial of an experiment: the phases of its environment steps, except the controllers.
 
 mod address;
+mod interior;
+mod starts;
 
 use std::{mem, ops::Range};
 
-use crate::bodies::{Bodies, Pose};
 use crate::communication::{Mode, Radio};
 use crate::controllers::Controller;
 use crate::fitness::{Fitness, Moment};
@@ -13,8 +14,7 @@ use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
 use crate::objects::Switches;
 use crate::perturbations::Perturbations;
-use crate::record::Outline;
-use crate::record::{Measures, MovableRecord, RobotRecord, RoomRecord, StepRecord};
+use crate::record::{Measures, RobotRecord, StepRecord};
 use crate::script::{May, ScriptRun, View};
 use crate::senses::Senses;
 use crate::sensors::Surroundings;
@@ -29,6 +29,9 @@ use experiment_file::SensorQuery;
 use task_script::ScriptError;
 
 use self::address::Address;
+pub(crate) use self::interior::Interior;
+use self::starts::Starts;
+pub(crate) use self::starts::{room, try_places};
 
 /// State of a trial.
 pub(crate) struct Trial<'a> {
@@ -39,8 +42,8 @@ pub(crate) struct Trial<'a> {
     neighbours: Neighbours,
     /// The neighbours whose frames nothing blocks, where something may.
     audible: Option<Neighbours>,
-    /// Bodies and obstacles, in a world with them.
-    room: Option<(Bodies, Vec<Outline>)>,
+    /// `None` in a world without bodies.
+    interior: Option<Interior>,
     radio: Radio,
     lights: Vec<Vec2>,
     light_paths: Vec<LightPath>,
@@ -90,38 +93,6 @@ pub(crate) fn encoding_streams(
     trials.iter().flat_map(of_trial).collect()
 }
 
-/// Draws the start positions of all objects of a trial; fails where [`Trial::new`] does.
-pub(crate) fn try_places(
-    simulation: &Simulation,
-    trial_set: TrialSet,
-    trial: u32,
-) -> Result<(), EvaluateError> {
-    let address = Address { seed: simulation.seed, trial_set, trial };
-    if let Some(room) = &simulation.world.room {
-        address.furnish(room, &simulation.world)?;
-        let World { lights, areas, torus, .. } = &simulation.world;
-        address.place_static_objects(lights, torus)?;
-        address.place_static_objects(areas, torus)?;
-        return Ok(());
-    }
-    for site in simulation.world.sites() {
-        let mut stream = address.stream(Purpose::Positions, site.object);
-        address.place(site, &simulation.world.torus, &mut stream)?;
-    }
-    Ok(())
-}
-
-/// The room of a trial; `None` in a world without bodies.
-pub(crate) fn room(
-    simulation: &Simulation,
-    trial_set: TrialSet,
-    trial: u32,
-) -> Result<Option<RoomRecord>, EvaluateError> {
-    let address = Address { seed: simulation.seed, trial_set, trial };
-    let Some(room) = &simulation.world.room else { return Ok(None) };
-    Ok(Some(room.record(address.furnish(room, &simulation.world)?)))
-}
-
 impl<'a> Trial<'a> {
     /// The trial before its first step. Once `goes_on` returns false, a script fails at once.
     pub fn new(
@@ -132,37 +103,18 @@ impl<'a> Trial<'a> {
     ) -> Result<Self, EvaluateError> {
         let world = &simulation.world;
         let address = Address { seed: simulation.seed, trial_set, trial };
-        let mut positions = Vec::with_capacity(world.n_robots());
-        let mut headings = Vec::with_capacity(world.n_robots());
+        let Starts { positions, headings, streams, lights, areas, interior } =
+            Starts::draw(address, world)?;
         let mut groups = Vec::with_capacity(world.groups.len());
-        let furnished = match &world.room {
-            Some(room) => Some(address.furnish(room, world)?),
-            None => None,
-        };
-        for (number, group) in world.groups.iter().enumerate() {
-            let mut stream = address.stream(Purpose::Positions, group.site.object);
-            match &furnished {
-                Some(furnished) => {
-                    let poses = &furnished.robots[number];
-                    positions.extend(poses.iter().map(|pose| pose.position));
-                    headings.extend(poses.iter().map(|pose| pose.heading));
-                }
-                None => {
-                    positions.extend(address.place(&group.site, &world.torus, &mut stream)?);
-                    let mut orientations = address.stream(Purpose::Orientations, group.site.object);
-                    headings.extend(group.headings.draw(&mut orientations));
-                }
-            }
+        for (group, positions) in world.groups.iter().zip(streams) {
             let perturbations =
                 Perturbations::new(&group.perturbations, group.robots.len(), |number| {
                     address.stream(Purpose::Perturbation, number)
                 });
             let noise = |number| address.numbered_stream(Purpose::SensorNoise, number);
             let senses = Senses::new(group, &perturbations, noise);
-            groups.push(Group { senses, perturbations, positions: stream });
+            groups.push(Group { senses, perturbations, positions });
         }
-        let lights = address.place_static_objects(&world.lights, &world.torus)?;
-        let areas = address.place_static_objects(&world.areas, &world.torus)?;
         let controllers = world.lights.iter().zip(&world.light_controllers);
         let controllers = controllers
             .flat_map(|(lights, controller)| lights.members.clone().map(move |_| controller));
@@ -191,7 +143,7 @@ impl<'a> Trial<'a> {
             swarm,
             neighbours: Neighbours::new(world.sensing_range(), n_robots),
             audible: world.has_shadows().then(|| Neighbours::new(0.0, n_robots)),
-            room: furnished.map(|furnished| (furnished.bodies, furnished.obstacles)),
+            interior,
             radio,
             switches: Switches { lights: vec![true; lights.len()], areas: vec![true; areas.len()] },
             lights,
@@ -239,15 +191,9 @@ impl<'a> Trial<'a> {
         if moved {
             self.neighbours.update(&self.world.torus, &self.swarm.positions);
         }
-        if let (true, Some(audible), Some((bodies, _))) = (moved, &mut self.audible, &self.room) {
+        if let (true, Some(audible), Some(interior)) = (moved, &mut self.audible, &self.interior) {
             audible.clone_from(&self.neighbours);
-            let (world, positions) = (self.world, &self.swarm.positions);
-            audible.retain(|robot, neighbour| {
-                let other = neighbour.robot;
-                let blocked_by = world.groups[world.group_of(robot)].frames_blocked_by;
-                let ends = [robot, other];
-                bodies.is_clear(positions[robot], positions[other], blocked_by, &ends)
-            });
+            interior.retain_audible(self.world, &self.swarm.positions, audible);
         }
         let audible = self.audible.as_ref().unwrap_or(&self.neighbours);
         if moved || turned {
@@ -262,7 +208,7 @@ impl<'a> Trial<'a> {
                 lights: &self.lights,
                 areas: &self.areas,
                 switches: &self.switches,
-                bodies: self.room.as_ref().map(|(bodies, _)| bodies),
+                bodies: self.interior.as_ref().map(|interior| &interior.bodies),
             };
             state.senses.update(group, &self.swarm, &surroundings);
         }
@@ -402,14 +348,14 @@ impl<'a> Trial<'a> {
         run: impl FnOnce(&mut ScriptRun<'a>, View<'_>) -> Result<T, ScriptError>,
     ) -> Result<Option<T>, EvaluateError> {
         let Some(script) = &mut self.script else { return Ok(None) };
-        let Self { world, swarm, lights, areas, switches, room, groups, .. } = self;
+        let Self { world, swarm, lights, areas, switches, interior, groups, .. } = self;
         let view = View {
             world,
             swarm,
             lights,
             areas,
             switches,
-            room: room.as_mut(),
+            interior: interior.as_mut(),
             groups,
             step,
             n_steps: self.n_steps,
@@ -475,15 +421,8 @@ impl<'a> Trial<'a> {
         for (robot, target) in self.world.evaluated().zip(targets) {
             robots[robot].target = Some(*target);
         }
-        if let Some((bodies, _)) = &self.room {
-            for (robot, record) in robots.iter_mut().enumerate() {
-                record.touches = !bodies.bumps(robot).is_empty();
-            }
-            movables.clear();
-            movables.extend(bodies.loads().map(|load| {
-                let Pose { position, heading } = bodies.pose(load);
-                MovableRecord { position, heading }
-            }));
+        if let Some(interior) = &self.interior {
+            interior.record(robots, movables);
         }
         lights.clone_from(&self.lights);
         areas.clone_from(&self.areas);
@@ -505,21 +444,8 @@ impl<'a> Trial<'a> {
     /// Moves all robots by their wheels.
     fn drive(&mut self) {
         let swarm = &mut self.swarm;
-        if let Some((bodies, _)) = &mut self.room {
-            for group in &self.world.groups {
-                let Some(drive) = &group.drive else { continue };
-                for robot in group.robots.clone() {
-                    let (speed, turning) = drive.asks(swarm.wheels[robot]);
-                    bodies.ask(robot, speed, turning);
-                }
-            }
-            swarm.moved |= bodies.step();
-            for robot in 0..swarm.positions.len() {
-                let Pose { position, heading } = bodies.pose(robot);
-                swarm.moved |= swarm.positions[robot] != position;
-                swarm.turned |= swarm.headings[robot] != heading;
-                (swarm.positions[robot], swarm.headings[robot]) = (position, heading);
-            }
+        if let Some(interior) = &mut self.interior {
+            interior.drive(self.world, swarm);
             return;
         }
         for group in &self.world.groups {

@@ -9,6 +9,7 @@ use super::change::May;
 use super::view::{Answer, Kind, NO_OBJECT, View, number, thing};
 use crate::bodies::Pose;
 use crate::torus::wrap_angle;
+use crate::trial::Interior;
 
 /// Work of comparing a movable with each thing where it may be put, in statements.
 const PLACING: usize = 4;
@@ -16,14 +17,16 @@ const PLACING: usize = 4;
 impl<'a> View<'a> {
     /// Where a movable is.
     pub(super) fn pose(&self, movable: usize) -> Result<Pose, String> {
-        let (bodies, _) = self.room.as_deref().ok_or(NO_OBJECT)?;
+        let Interior { bodies, .. } = self.interior.as_deref().ok_or(NO_OBJECT)?;
         Ok(bodies.pose(bodies.loads().start + movable))
     }
 
     /// What a robot touches after the last step: robots, then movables, each by their numbers,
     /// then `None` for all walls and obstacles.
     pub(super) fn touches(&self, robot: usize, meter: &Rc<Meter>) -> Answer {
-        let Some((bodies, _)) = self.room.as_deref() else { return Value::list(vec![], meter) };
+        let Some(Interior { bodies, .. }) = self.interior.as_deref() else {
+            return Value::list(vec![], meter);
+        };
         let bumps = bodies.bumps(robot);
         meter.work(bumps.len() / 4)?;
         let mut touched: Vec<usize> = bumps.iter().filter_map(|bump| bump.body).collect();
@@ -46,7 +49,7 @@ impl<'a> View<'a> {
         meter: &Rc<Meter>,
     ) -> Result<bool, String> {
         let (from, to) = (self.point(a)?, self.point(b)?);
-        let Some((bodies, _)) = self.room.as_deref() else { return Ok(false) };
+        let Some(Interior { bodies, .. }) = self.interior.as_deref() else { return Ok(false) };
         meter.work(bodies.n_fixtures() / 4)?;
         Ok(!bodies.is_clear(from, to, BlockedBy::Walls, &[]))
     }
@@ -85,7 +88,9 @@ impl<'a> View<'a> {
         if let Some(heading) = heading {
             pose.heading = wrap_angle(finite(heading)?);
         }
-        let (Some(room), Some((bodies, obstacles))) = (&self.world.room, &mut self.room) else {
+        let (Some(room), Some(Interior { bodies, obstacles })) =
+            (&self.world.room, self.interior.as_deref_mut())
+        else {
             return Ok(false);
         };
         meter.work(PLACING * bodies.n_things())?;

@@ -10,14 +10,12 @@ use task_script::{Host, Meter, Name, Object, Value};
 
 use super::change::May;
 use super::names::Named;
-use crate::bodies::Bodies;
 use crate::border;
 use crate::communication::Mode;
 use crate::objects::{StaticObjects, Switches};
-use crate::record::Outline;
 use crate::swarm::Swarm;
 use crate::torus::{Vec2, wrap_angle};
-use crate::trial::Group;
+use crate::trial::{Group, Interior};
 use crate::world::World;
 
 /// The only object of its kind.
@@ -79,8 +77,8 @@ pub(crate) struct View<'a> {
     pub lights: &'a mut [Vec2],
     pub areas: &'a mut [Vec2],
     pub switches: &'a mut Switches,
-    /// Bodies and obstacles, in a world with them.
-    pub room: Option<&'a mut (Bodies, Vec<Outline>)>,
+    /// `None` in a world without bodies.
+    pub interior: Option<&'a mut Interior>,
     /// Readings of robots, group by group.
     pub groups: &'a [Group],
     /// Environment step, from 0.
@@ -105,7 +103,7 @@ impl<'a> View<'a> {
             lights: self.lights,
             areas: self.areas,
             switches: self.switches,
-            room: self.room.as_deref_mut(),
+            interior: self.interior.as_deref_mut(),
             groups: self.groups,
             step: self.step,
             n_steps: self.n_steps,
@@ -145,8 +143,9 @@ impl<'a> View<'a> {
             Named::AllRobots => (Kind::Robot, 0..self.world.n_robots()),
             Named::Lights => (Kind::Light, 0..self.lights.len()),
             Named::Movables => {
-                let bodies = self.room.as_deref().map(|(bodies, _)| bodies);
-                (Kind::Movable, 0..bodies.map_or(0, |bodies| bodies.loads().len()))
+                let interior = self.interior.as_deref();
+                let n_movables = interior.map_or(0, |interior| interior.bodies.loads().len());
+                (Kind::Movable, 0..n_movables)
             }
             _ => (Kind::Area, 0..self.areas.len()),
         };
