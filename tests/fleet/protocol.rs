@@ -216,14 +216,14 @@ async fn a_silent_worker_loses_its_items_and_its_stream() {
 
 /// Copies experiment 1 of a coordinator to all numbers up to `last`. `state`: of each copy.
 fn copy_to(coordinator: &CoordinatorProcess, last: u64, state: impl Fn(u64) -> &'static str) {
-    let columns =
-        "id, name, config, config_digest, fingerprint, genotype_len, state, submitted_at_ms";
+    let columns = "id, name, config_digest, fingerprint, genotype_len, state, submitted_at_ms";
     let mut copies = format!("BEGIN; CREATE TEMP TABLE copy AS SELECT {columns} FROM experiments;");
     for id in 2..=last {
         let state = state(id);
         copies += &format!(
             "UPDATE copy SET id = {id}, state = '{state}';
-             INSERT INTO experiments ({columns}) SELECT {columns} FROM copy;"
+             INSERT INTO experiments ({columns}) SELECT {columns} FROM copy;
+             INSERT INTO configs SELECT {id}, config FROM configs WHERE experiment_id = 1;"
         );
     }
     coordinator.database().execute_batch(&(copies + "COMMIT;")).unwrap();

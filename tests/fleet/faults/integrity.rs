@@ -27,8 +27,8 @@ fn an_experiment_whose_configuration_was_edited_waits_for_a_person_and_the_other
     let mut coordinator = CoordinatorProcess::start();
     let edited = TINY.submit(&coordinator);
     let sound = OTHER.submit(&coordinator);
-    let read = "SELECT config FROM experiments WHERE id = ?1";
-    let write = "UPDATE experiments SET config = ?2 WHERE id = ?1";
+    let read = "SELECT config FROM configs WHERE experiment_id = ?1";
+    let write = "UPDATE configs SET config = ?2 WHERE experiment_id = ?1";
     let original: String =
         coordinator.database().query_row(read, [edited], |row| row.get(0)).unwrap();
     // Changes only the seed.

@@ -6,8 +6,8 @@ use super::{Result, Store, StoreError, experiments, fitness_log, forks};
 use crate::ids::ExperimentId;
 
 /// The tables with rows of experiments; referenced tables come last.
-const TABLES: [&str; 6] =
-    ["fitness_log", "keyframes", "champions", "events", "generations", "forks"];
+const TABLES: [&str; 7] =
+    ["fitness_log", "keyframes", "champions", "events", "generations", "forks", "configs"];
 
 impl Store {
     /// Deletes an experiment that has ended, with all its data; its number is never used again.

@@ -6,8 +6,8 @@ use rusqlite::{OptionalExtension, Transaction, params};
 
 use super::{
     Evidence, ExperimentRecord, ExperimentState, ForkRecord, GenerationRecord, LogGap, Result,
-    Store, StoreError, add_notice, add_state_event, champions, fitness_log, forks, history, seals,
-    seals::Sealer,
+    Store, StoreError, add_notice, add_state_event, champions, configs, fitness_log, forks,
+    history, seals::Sealer,
 };
 use crate::{ids::ExperimentId, priority::Priority};
 
@@ -69,7 +69,9 @@ impl Store {
         self.read(|connection| {
             let mut statement = connection.prepare_cached(
                 "SELECT id FROM experiments
-                 WHERE config_digest = ?1 AND digest = ?2 AND config = ?3 ORDER BY id",
+                 WHERE config_digest = ?1 AND digest = ?2
+                       AND (SELECT config FROM configs WHERE experiment_id = id) = ?3
+                 ORDER BY id",
             )?;
             let id = statement
                 .query_row(params![config_digest, digest, bundle.config_json], |row| {
@@ -103,12 +105,11 @@ fn put_row(
     let Imported { bundle, name, genotype_len, state, .. } = imported;
     let manifest = &bundle.manifest;
     transaction.execute(
-        "INSERT INTO experiments (name, config, config_digest, fingerprint, genotype_len, state,
-                                  reason, submitted_at_ms, digest, priority)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
+        "INSERT INTO experiments (name, config_digest, fingerprint, genotype_len, state, reason,
+                                  submitted_at_ms, digest, priority)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
         params![
             name,
-            bundle.config_json,
             manifest.config_digest.to_string(),
             manifest.simulation,
             genotype_len,
@@ -120,7 +121,7 @@ fn put_row(
         ],
     )?;
     let id = ExperimentId(transaction.last_insert_rowid().unsigned_abs());
-    seals::seal_experiment(transaction, sealer, id)?;
+    configs::put(transaction, sealer, id, &bundle.config_json)?;
     Ok(id)
 }
 

@@ -85,11 +85,16 @@ pub fn get(connection: &Connection, id: ExperimentId) -> Result<Option<StoredExp
     if i64::try_from(id.0).is_err() {
         return Ok(None); // SQLite's integers are signed.
     }
-    let sql = format!("SELECT {COLUMNS}, e.config FROM {TABLES} WHERE e.id = ?1");
+    let sql = format!(
+        "SELECT {COLUMNS}, (SELECT config FROM configs WHERE experiment_id = e.id) AS config
+         FROM {TABLES} WHERE e.id = ?1"
+    );
     let mut statement = connection.prepare_cached(&sql)?;
     let stored = statement.query_row([id.0], |row| Ok((read(row)?, row.get("config")?)));
     let Some((record, config_json)) = stored.optional()? else { return Ok(None) };
-    Ok(Some(StoredExperiment { record: record?, config_json }))
+    let lost = || StoreError::Corrupt(format!("experiment {id} has lost its configuration"));
+    let config_json: Option<String> = config_json;
+    Ok(Some(StoredExperiment { record: record?, config_json: config_json.ok_or_else(lost)? }))
 }
 
 /// The experiments that pass a filter, oldest first.

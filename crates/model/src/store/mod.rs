@@ -5,6 +5,7 @@
 //! returns, and fails if another coordinator has taken over the database.
 
 mod champions;
+mod configs;
 mod deletion;
 mod error;
 mod events;
@@ -152,14 +153,13 @@ impl Store {
         }
         self.write(|transaction, sealer| {
             transaction.execute(
-                "INSERT INTO experiments (request_id, name, config, config_digest, fingerprint,
+                "INSERT INTO experiments (request_id, name, config_digest, fingerprint,
                                           genotype_len, state, submitted_at_ms, priority,
                                           group_name, variant, labels)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, 'running', ?7, ?8, ?9, ?10, ?11)",
+                 VALUES (?1, ?2, ?3, ?4, ?5, 'running', ?6, ?7, ?8, ?9, ?10)",
                 params![
                     new.request_id,
                     new.config.name,
-                    new.config.to_canonical_json(),
                     new.config_digest.to_string(),
                     sim_core::FINGERPRINT,
                     new.genotype_len,
@@ -171,7 +171,7 @@ impl Store {
                 ],
             )?;
             let id = ExperimentId(transaction.last_insert_rowid().unsigned_abs());
-            seals::seal_experiment(transaction, sealer, id)?;
+            configs::put(transaction, sealer, id, &new.config.to_canonical_json())?;
             add_state_event(transaction, id, now_ms, ExperimentState::Running, "submitted")?;
             let mut latest = None;
             if let Some(fork) = &new.fork {
@@ -297,12 +297,12 @@ impl Store {
     ) -> Result<()> {
         self.write(|transaction, sealer| {
             let n_changed = transaction.execute(
-                "UPDATE experiments SET state = 'running', reason = '', config = ?3, archived = 0
+                "UPDATE experiments SET state = 'running', reason = '', archived = 0
                  WHERE id = ?1 AND state = ?2 AND state NOT IN ('running', 'paused')",
-                params![id.0, from.name(), config_json],
+                params![id.0, from.name()],
             )?;
             if n_changed > 0 {
-                seals::seal_experiment(transaction, sealer, id)?;
+                configs::put(transaction, sealer, id, config_json)?;
                 add_state_event(transaction, id, now_ms, ExperimentState::Running, why)?;
             }
             Ok(())

@@ -25,6 +25,9 @@ const LABELS: i64 = 10;
 /// The first version with summaries.
 const SUMMARIES: i64 = 11;
 
+/// The first version with configurations in a table of their own.
+const CONFIGS: i64 = 13;
+
 /// Makes a database of an older version readable as if it had the latest one, without changing
 /// it. Missing seals are empty.
 pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result<()> {
@@ -71,6 +74,9 @@ pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result
         let none = "0 AS experiment_id, 0 AS parent_id, 0 AS generation, '' AS link,
                     '' AS changes, x'' AS seal WHERE false";
         views.push(("forks", none.to_owned()));
+    }
+    if version < CONFIGS {
+        views.push(("configs", "id AS experiment_id, config FROM main.experiments".to_owned()));
     }
     let priority = if_before(2, ", 100 AS priority");
     let log = if_before(

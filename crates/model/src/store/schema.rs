@@ -4,7 +4,7 @@ use rusqlite::{Connection, TransactionBehavior};
 
 use super::{StoreError, seals};
 
-/// Makes the column `summary` from the column `config`: a list of the fields of
+/// Makes the column `summary` from a column `config`: a list of the fields of
 /// [`Summary`](super::Summary). `->` keeps all digits of a seed. This is part of a migration, so
 /// it never changes.
 macro_rules! summary {
@@ -331,6 +331,54 @@ pub(super) const MIGRATIONS: &[&str] = &[
     DROP TABLE champions;
     ALTER TABLE listed_champions RENAME TO champions;
 ",
+    // With the files in their rows, a list would still read a page for each experiment.
+    "
+    CREATE TABLE configs (
+        experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
+        -- The experiment file in canonical form, seed included.
+        config TEXT NOT NULL
+    ) STRICT;
+    INSERT INTO configs SELECT id, config FROM experiments ORDER BY id;
+
+    CREATE TABLE narrow_experiments (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        request_id TEXT UNIQUE,
+        name TEXT NOT NULL,
+        config_digest TEXT NOT NULL,
+        fingerprint TEXT NOT NULL,
+        genotype_len INTEGER NOT NULL,
+        state TEXT NOT NULL
+              CHECK (state IN ('running', 'paused', 'completed', 'failed', 'cancelled')),
+        reason TEXT NOT NULL DEFAULT '',
+        submitted_at_ms INTEGER NOT NULL,
+        digest TEXT NOT NULL DEFAULT '',
+        priority INTEGER NOT NULL DEFAULT 100 CHECK (priority BETWEEN 1 AND 1000),
+        seal BLOB NOT NULL DEFAULT x'',
+        group_name TEXT,
+        variant TEXT,
+        log_from INTEGER NOT NULL DEFAULT 0,
+        log_gap TEXT NOT NULL DEFAULT ''
+                CHECK (log_gap IN ('', 'older', 'pruned', 'damaged', 'forked')),
+        labels TEXT NOT NULL DEFAULT '{}',
+        archived INTEGER NOT NULL DEFAULT 0 CHECK (archived IN (0, 1)),
+        -- Some keys of the file, as a JSON list; NULL if the file is not JSON.
+        summary TEXT
+    ) STRICT;
+    INSERT INTO narrow_experiments
+    SELECT id, request_id, name, config_digest, fingerprint, genotype_len, state, reason,
+           submitted_at_ms, digest, priority, seal, group_name, variant, log_from, log_gap,
+           labels, archived, summary
+    FROM experiments ORDER BY id;
+    -- Numbers of deleted experiments are not used again.
+    DELETE FROM sqlite_sequence WHERE name = 'narrow_experiments';
+    UPDATE sqlite_sequence SET name = 'narrow_experiments' WHERE name = 'experiments';
+    DROP TABLE experiments;
+    ALTER TABLE narrow_experiments RENAME TO experiments;
+    CREATE INDEX experiments_by_name ON experiments (name);
+    CREATE INDEX experiments_by_group ON experiments (group_name);
+    CREATE INDEX experiments_by_digest ON experiments (config_digest);
+    CREATE INDEX experiments_by_state ON experiments (state);
+",
 ];
 
 /// The first version with seals.
@@ -376,8 +424,16 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
 
 /// The first missing table or column of a database that should have the latest version.
 pub fn missing(connection: &Connection) -> Option<String> {
-    let tables =
-        ["experiments", "generations", "events", "champions", "fitness_log", "keyframes", "forks"];
+    let tables = [
+        "experiments",
+        "configs",
+        "generations",
+        "events",
+        "champions",
+        "fitness_log",
+        "keyframes",
+        "forks",
+    ];
     tables.iter().find_map(|table| {
         let key = if *table == "experiments" { "id" } else { "experiment_id" };
         let looked = connection.prepare(&format!("SELECT {key} FROM {table} LIMIT 0"));
@@ -400,66 +456,4 @@ fn of_other_tables(error: rusqlite::Error) -> StoreError {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn experiments_of_the_first_schema_are_kept_and_may_be_paused() {
-        let mut connection = Connection::open_in_memory().unwrap();
-        connection.execute_batch(MIGRATIONS[0]).unwrap();
-        connection
-            .execute_batch(
-                "INSERT INTO experiments (id, request_id, name, config, config_digest, fingerprint,
-                                          genotype_len, state, reason, submitted_at_ms, digest)
-                 VALUES (3, 'key', 'n', '{}', 'd', 'f', 5, 'failed', 'why', 7, 'link');
-                 INSERT INTO checkpoints VALUES (3, 'checkpoint');
-                 PRAGMA user_version = 1;",
-            )
-            .unwrap();
-        migrate(&mut connection).unwrap();
-        assert_eq!(version(&connection).unwrap(), VERSION);
-        let row =
-            "SELECT id || request_id || state || reason || digest || priority FROM experiments";
-        let text =
-            |sql: &str| connection.query_row(sql, [], |row| row.get::<_, String>(0)).unwrap();
-        assert_eq!(text(row), "3keyfailedwhylink100");
-        assert_eq!(text("SELECT count(*) || '' FROM keyframes"), "0", "nothing can use it");
-        connection.execute("UPDATE experiments SET state = 'paused'", []).unwrap();
-        connection
-            .execute("INSERT INTO keyframes VALUES (9, 0, x'', x'')", [])
-            .expect_err("references are checked again");
-        connection
-            .execute(
-                "INSERT INTO experiments (name, config, config_digest, fingerprint, genotype_len,
-                                          state, submitted_at_ms)
-                 SELECT name, config, config_digest, fingerprint, genotype_len, state,
-                        submitted_at_ms FROM experiments",
-                [],
-            )
-            .unwrap();
-        assert_eq!(connection.last_insert_rowid(), 4, "ids are not reused");
-    }
-
-    #[test]
-    fn the_number_of_a_deleted_experiment_is_not_used_again_in_a_later_version() {
-        let put = "INSERT INTO experiments (name, config, config_digest, fingerprint, genotype_len,
-                                            state, submitted_at_ms)
-                   VALUES ('n', '{\"seed\": 5}', 'd', 'f', 5, 'failed', 7);";
-        for kept in ["", put] {
-            let mut connection = Connection::open_in_memory().unwrap();
-            for statements in &MIGRATIONS[..10] {
-                connection.execute_batch(statements).unwrap();
-            }
-            connection.execute_batch(&format!("{put}{put}DELETE FROM experiments;")).unwrap();
-            connection.execute_batch(&format!("{kept}PRAGMA user_version = 10;")).unwrap();
-            migrate(&mut connection).unwrap();
-            connection.execute_batch(put).unwrap();
-            let n_before = 2 + i64::from(!kept.is_empty());
-            assert_eq!(connection.last_insert_rowid(), n_before + 1);
-            let summary: String = connection
-                .query_row("SELECT summary FROM experiments", [], |row| row.get(0))
-                .unwrap();
-            assert!(summary.starts_with("[5,null,"), "{summary}");
-        }
-    }
-}
+mod tests;

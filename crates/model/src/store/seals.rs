@@ -132,8 +132,9 @@ pub fn experiment_seal(
     id: ExperimentId,
 ) -> rusqlite::Result<(Vec<u8>, Seal)> {
     let mut statement = connection.prepare_cached(
-        "SELECT seal, config, config_digest, fingerprint, genotype_len FROM experiments
-         WHERE id = ?1",
+        "SELECT seal, (SELECT config FROM configs WHERE experiment_id = id), config_digest,
+                fingerprint, genotype_len
+         FROM experiments WHERE id = ?1",
     )?;
     statement.query_row([id.0], |row| {
         let config = row.get_ref(1)?.as_bytes()?;

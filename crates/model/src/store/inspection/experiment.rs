@@ -232,9 +232,10 @@ fn read_row(
             fork: None,
         })
     };
-    let sql = "SELECT request_id, name, config, config_digest, fingerprint, genotype_len, state,
-                      reason, submitted_at_ms, digest, priority, group_name, variant,
-                      log_from, log_gap, labels, archived
+    let sql =
+        "SELECT request_id, name, (SELECT config FROM configs WHERE experiment_id = id) AS config,
+                      config_digest, fingerprint, genotype_len, state, reason, submitted_at_ms,
+                      digest, priority, group_name, variant, log_from, log_gap, labels, archived
                FROM experiments WHERE id = ?1";
     let row = connection.query_row(sql, [id.0], from_row).map_err(&unreadable)?;
     let fork = forks::get(connection, sealer, id).map_err(|error| error.to_string())?;

@@ -7,8 +7,8 @@ use rusqlite::{Connection, Transaction, params};
 use super::{
     super::{
         ExperimentState, GenerationRecord, LogGap, NewExperiment, Result, StoreError, add_notice,
-        add_state_event, champions, file, fitness_log, forks, history, quarantine, schema,
-        seals::{self, Sealer},
+        add_state_event, champions, configs, file, fitness_log, forks, history, quarantine, schema,
+        seals::Sealer,
     },
     backup::{abandon, prepare},
     experiment::{EventRow, ExperimentRow, Fate, Inspected},
@@ -210,16 +210,15 @@ fn write_row(
     (state, reason, digest): (ExperimentState, &str, &str),
 ) -> Result<()> {
     transaction.execute(
-        "INSERT INTO experiments (id, request_id, name, config, config_digest, fingerprint,
-                                  genotype_len, state, reason, submitted_at_ms, digest, priority,
-                                  group_name, variant, labels, archived)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15,
-                 ?16 AND ?8 NOT IN ('running', 'paused'))",
+        "INSERT INTO experiments (id, request_id, name, config_digest, fingerprint, genotype_len,
+                                  state, reason, submitted_at_ms, digest, priority, group_name,
+                                  variant, labels, archived)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14,
+                 ?15 AND ?7 NOT IN ('running', 'paused'))",
         params![
             id.0,
             row.request_id,
             row.name,
-            row.config,
             row.config_digest,
             row.fingerprint,
             row.genotype_len,
@@ -234,7 +233,7 @@ fn write_row(
             row.is_archived,
         ],
     )?;
-    Ok(seals::seal_experiment(transaction, sealer, id)?)
+    Ok(configs::put(transaction, sealer, id, &row.config)?)
 }
 
 fn write_events(

@@ -120,7 +120,8 @@ fn a_sound_database_has_no_findings_in_use_or_not_and_nothing_is_left_beside_it(
 #[test]
 fn every_edit_is_found_and_named() {
     for (sql, experiment, what) in [
-        ("UPDATE experiments SET config = '{}' WHERE id = 2", 2, "its configuration is not"),
+        ("UPDATE configs SET config = '{}' WHERE experiment_id = 2", 2, "its configuration is not"),
+        ("DELETE FROM configs WHERE experiment_id = 2", 2, "its configuration cannot be read"),
         (
             "UPDATE generations SET best = 9 WHERE experiment_id = 3",
             3,
@@ -201,7 +202,7 @@ fn recovery_keeps_sound_experiments_and_restarts_computable_ones() {
         directory.path(),
         "UPDATE generations SET best = 9 WHERE experiment_id = 1;
          UPDATE keyframes SET state = x'7b7d' WHERE experiment_id = 2;
-         UPDATE experiments SET config = '{}' WHERE id = 3;
+         UPDATE configs SET config = '{}' WHERE experiment_id = 3;
          DELETE FROM events WHERE experiment_id = 4;
          INSERT INTO quarantine VALUES ('lab-2', 'it lies', 7);",
     );

@@ -236,7 +236,7 @@ fn every_program_finds_a_recovered_ended_experiment_sound() {
     let refused = store.resumable(id).unwrap_err();
     assert!(matches!(refused, StoreError::NoCheckpoint(_)), "{refused}");
     // Both report a later change as damage.
-    edit(&recovered, "UPDATE experiments SET config = '{}' WHERE id = 1");
+    edit(&recovered, "UPDATE configs SET config = '{}' WHERE experiment_id = 1");
     assert!(!findings(&recovered).is_empty());
 }
 

@@ -10,6 +10,7 @@ use super::super::{
     schema::{MIGRATIONS, SEALED, VERSION},
     tests::new_experiment,
 };
+use super::CONFIGS;
 
 /// Replaces a directory's database by one of an older version. That version's own statements make
 /// it, and the same rows fill its columns.
@@ -30,6 +31,7 @@ pub fn downgrade(directory: &Path, version: i64) {
     ) {
         // Before the log, a row had the latest state, and another table the later steps.
         let source = match table.as_str() {
+            "experiments" if version < CONFIGS => "SELECT * FROM latest.experiments JOIN latest.configs ON experiment_id = id",
             "checkpoints" if version < 5 => "SELECT experiment_id, CAST(state AS TEXT) AS state, seal FROM latest.keyframes ORDER BY n_generations",
             "checkpoints" => "SELECT * FROM latest.keyframes ORDER BY n_generations",
             "checkpoint_steps" => "SELECT *, told AS step FROM latest.fitness_log AS l WHERE generation >=
@@ -128,7 +130,7 @@ fn released_migrations_stay_as_they_are() {
         digests.collect::<Vec<_>>(),
         [
             "b9a7777d", "54864f37", "1799e364", "59bb63f0", "122ab170", "23bb2022", "0a27952a",
-            "875bbdd8", "1addcd31", "1333a318", "d87a0e15", "36e4d691"
+            "875bbdd8", "1addcd31", "1333a318", "d87a0e15", "36e4d691", "c01a736b"
         ]
     );
 }

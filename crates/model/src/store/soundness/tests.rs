@@ -23,7 +23,11 @@ fn two_experiments(directory: &Path) -> (Store, [ExperimentId; 2]) {
 #[test]
 fn edited_and_moved_rows_are_found_and_their_neighbours_are_not_blamed() {
     for (edit, what) in [
-        ("UPDATE experiments SET config = replace(config, '1', '2') WHERE id = 1", "configuration"),
+        (
+            "UPDATE configs SET config = replace(config, '1', '2') WHERE experiment_id = 1",
+            "configuration",
+        ),
+        ("DELETE FROM configs WHERE experiment_id = 1", "configuration"),
         ("UPDATE experiments SET config_digest = 'd' WHERE id = 1", "configuration"),
         ("UPDATE experiments SET fingerprint = 'f' WHERE id = 1", "configuration"),
         ("UPDATE experiments SET seal = x'' WHERE id = 1", "configuration"),
@@ -253,7 +257,8 @@ fn invalid_text_and_missing_rows_are_damage_with_the_path() {
         }
         other => panic!("{other:?}"),
     };
-    let garbage = "UPDATE experiments SET name = CAST(x'ff' AS TEXT), config = CAST(x'ff' AS TEXT)";
+    let garbage = "UPDATE experiments SET name = CAST(x'ff' AS TEXT);
+                   UPDATE configs SET config = CAST(x'ff' AS TEXT)";
     store.connection.execute_batch(garbage).unwrap();
     assert_damage(store.experiments(&Filter::default()).map(|_| ()));
     assert_damage(store.experiment(id).map(|_| ()));
