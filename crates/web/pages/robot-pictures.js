@@ -18,33 +18,37 @@ export class RobotPictures {
     this.madeFor = "";
   }
 
-  draw(context, { camera, colors, episode, poses, radius, view }) {
+  draw(context, world) {
+    const { camera, colors, episode, poses, view } = world;
     const ratio = context.getTransform().a;
     // While the user zooms, sizes with an invisible difference share pictures.
-    const size = Math.round(radius * 4) / 4;
-    const madeFor = `${size} ${ratio} ${colors.ground} ${colors.robot}`;
+    const sizes = poses.map((_, robot) => Math.round(world.radiusOf(robot) * 4) / 4);
+    const kinds = [...new Set(sizes)];
+    const madeFor = `${kinds} ${ratio} ${colors.ground} ${colors.robot}`;
     if (madeFor !== this.madeFor || this.pictures.size > KEPT_MAX) this.pictures.clear();
     this.madeFor = madeFor;
-    const hasNumbers = view.numbers && size >= NUMBERED_FROM;
     context.strokeStyle = colors.ink;
     // A line of one pixel is drawn several times as fast as any wider one.
-    context.lineWidth = size <= SMALL ? 1 : size / 4;
+    context.lineWidth = kinds[0] <= SMALL ? 1 : kinds[0] / 4;
     context.beginPath();
-    for (const { x, y, heading } of poses) {
+    poses.forEach(({ x, y, heading }, robot) => {
+      const size = sizes[robot];
       const [aheadX, aheadY] = [1.75 * size * Math.cos(heading), -1.75 * size * Math.sin(heading)];
       camera.eachImage(x, y, 3 * size, (sx, sy) => {
         context.moveTo(sx, sy);
         context.lineTo(sx + aheadX, sy + aheadY);
       });
-    }
+    });
     context.stroke();
     for (let robot = 0; robot < episode.n_robots; robot++) {
+      const size = sizes[robot];
+      const hasNumbers = view.numbers && size >= NUMBERED_FROM;
       const whole = (name) => episode.whole(name, robot, view.step);
       const look = {
         led: whole("led"), relays: whole("relays") > 0, carries: whole("carries") > 0, failed: whole("failed") > 0,
         isTarget: whole("target") > 0, isFollowed: robot === view.robot, number: hasNumbers ? robot : null,
       };
-      const picture = this.of(look, size, ratio, colors);
+      const picture = this.of(look, size, kinds, ratio, colors);
       const side = picture.width / ratio;
       const { x, y } = poses[robot];
       // At whole pixels of the device and in its own size, a picture is copied; otherwise the
@@ -54,9 +58,10 @@ export class RobotPictures {
     }
   }
 
-  of(look, size, ratio, colors) {
+  of(look, size, kinds, ratio, colors) {
     const { led, relays, carries, failed, isTarget, isFollowed, number } = look;
-    const key = ((((led * 2 + relays) * 2 + carries) * 2 + failed) * 2 + isTarget) * 2 + isFollowed + (number === null ? 0 : 65536 * (number + 1));
+    const appearance = ((((led * 2 + relays) * 2 + carries) * 2 + failed) * 2 + isTarget) * 2 + isFollowed + (number === null ? 0 : 65536 * (number + 1));
+    const key = appearance * kinds.length + kinds.indexOf(size);
     let picture = this.pictures.get(key);
     if (!picture) this.pictures.set(key, (picture = paint(look, size, ratio, colors)));
     return picture;

@@ -32,15 +32,17 @@ export function drawRoom(context, world) {
 }
 
 /** A ring around every robot whose body touches something. */
-export function drawTouches(context, { camera, colors, episode, poses, radius, view }) {
+export function drawTouches(context, world) {
+  const { camera, colors, episode, poses, view } = world;
   context.strokeStyle = colors.accent;
   context.lineWidth = 2;
   context.beginPath();
   poses.forEach(({ x, y }, robot) => {
     if (!episode.whole("touches", robot, view.step)) return;
     const [sx, sy] = camera.toScreen(x, y);
-    context.moveTo(sx + radius + 1, sy);
-    context.arc(sx, sy, radius + 1, 0, 2 * Math.PI);
+    const radius = world.radiusOf(robot) + 1;
+    context.moveTo(sx + radius, sy);
+    context.arc(sx, sy, radius, 0, 2 * Math.PI);
   });
   context.stroke();
 }

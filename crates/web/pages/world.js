@@ -220,10 +220,15 @@ export class World {
     });
   }
 
-  /** Of a robot on the screen, pixels: to scale, if it has a body. */
+  /** Of the first robot on the screen, pixels. */
   get radius() {
+    return this.radiusOf(0);
+  }
+
+  /** Of a robot on the screen, pixels: to scale, if it has a body. */
+  radiusOf(robot) {
     const { room } = this.episode;
-    if (room) return Math.max(2, room.radii[0] * this.camera.scale);
+    if (room) return Math.max(2, room.radii[robot] * this.camera.scale);
     return Math.max(RADIUS_MIN, Math.min(RADIUS * this.camera.scale, 26));
   }
 
