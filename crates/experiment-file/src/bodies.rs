@@ -199,7 +199,7 @@ pub struct MovableConfig {
     pub params: MovableParams,
 }
 
-/// What stops light or frames.
+/// What stops light or frames, or hides a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BlockedBy {

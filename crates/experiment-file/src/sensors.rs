@@ -276,6 +276,9 @@ parameters! {
             .shown("pi: every sector sees everything")
             .original_from(|params| PI / f64::from(params.of_key::<u32>("n_sectors")))
             .recent(),
+        /// What hides another robot from the sensor.
+        blocked_by: BlockedBy =
+            of(Domain::Variant(BlockedBy::VARIANTS), Name("nothing")).recent(),
     }
 
     /// Sees whether the robot stands on a ground area of one colour.

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::{Decay, Noise, NoiseStream, Sensor, Surroundings, Viewpoint, take_sectors};
+use crate::neighbours::Neighbour;
 use crate::torus::wrap_angle;
 use crate::world::World;
 use experiment_file::{DistanceSensorConfig, NeighborhoodSensorConfig};
@@ -25,8 +26,17 @@ impl Sensor for DistanceSensorConfig {
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
         reading.fill(0.0);
         let decay = Decay { rho: self.decay_rho, phi: self.decay_phi };
+        // A line of sight costs more than the distance.
+        let is_seen = |neighbour: &Neighbour| {
+            neighbour.rho <= self.range
+                && surroundings.bodies.is_none_or(|bodies| {
+                    let ends = [from.robot, neighbour.robot];
+                    let to = surroundings.swarm.positions[neighbour.robot];
+                    bodies.is_clear(from.position, to, self.blocked_by, &ends)
+                })
+        };
         let neighbours = surroundings.neighbours.of_robot(from.robot);
-        for neighbour in neighbours.filter(|neighbour| neighbour.rho <= self.range) {
+        for neighbour in neighbours.filter(is_seen) {
             let bearing = wrap_angle(neighbour.bearing - from.heading);
             take_sectors(neighbour.rho, bearing, decay, self.aperture, reading, f64::max);
         }

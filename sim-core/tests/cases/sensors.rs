@@ -1,11 +1,11 @@
 //! Lights, distances, ground areas, noise, and inhibited stimuli.
 
 use experiment_file::{
-    DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
-    GroundSensorConfig, InhibitedStimulus, Initializer, LightController, LightParams,
-    LightSourceConfig, NeighborhoodSensorConfig, ObjectConfig, OrbitConfig, PlainSensorConfig,
-    PositionInitializers, RandomTargetsConfig, SensorQuery, StimuliInhibitionConfig,
-    StimulusConfig, SynapseGroupConfig, WholeReceiver,
+    BlockedBy, DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig,
+    GroundAreaParams, GroundSensorConfig, InhibitedStimulus, Initializer, LightController,
+    LightParams, LightSourceConfig, NeighborhoodSensorConfig, ObjectConfig, OrbitConfig,
+    PlainSensorConfig, PositionInitializers, RandomTargetsConfig, SensorQuery,
+    StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig, WholeReceiver,
 };
 
 use crate::assert_varied_agreement;
@@ -27,6 +27,7 @@ fn all_sensors() -> ExperimentConfig {
         decay_phi: 0.7,
         noise_variance: 0.02,
         aperture: 0.8,
+        blocked_by: BlockedBy::Nothing,
     });
     swarm.sensors.ground_sensor = Some(GroundSensorConfig { color: "black".into() });
     if let Some(light_sensor) = &mut swarm.sensors.light_sensor {

@@ -191,15 +191,16 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
             RobotController::BraitenbergLightFollower | RobotController::ScriptController => 0,
         };
         let sense = n_sensed * u64::from(robot.sensors.n_sectors());
-        // A line of sight to a light, or to a robot that is heard, meets every edge and body.
+        // A line to a light, or to a robot that is seen or heard, meets every edge and body.
         let light = robot.sensors.light_sensor.as_ref().map(|sensor| sensor.blocked_by);
+        let robots = robot.sensors.distance_sensor.as_ref().map(|sensor| sensor.blocked_by);
         let frames = robot.sensors.wireless_receiver.as_ref().map(|sensor| sensor.blocked_by);
         let line = |blocked_by| match blocked_by {
             None | Some(BlockedBy::Nothing) => 0,
             Some(BlockedBy::Walls) => n_edges,
             Some(BlockedBy::Bodies) => n_edges + n_robots + n_movables,
         };
-        let look = n_static_objects * line(light) + n_robots * line(frames);
+        let look = n_static_objects * line(light) + n_robots * (line(robots) + line(frames));
         u64::from(robot.num_instances) * (think + sense + look + n_lattice_points(robot))
     };
     let substeps = config.world.bodies.map_or(0, |bodies| u64::from(bodies.substeps));

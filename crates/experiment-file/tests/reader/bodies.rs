@@ -138,6 +138,10 @@ fn sensors_of_bodies_have_their_readings_and_what_they_see() {
     let mounted =
         sensors(r#"{"blocked_by": "walls"}, "contact_sensor": {}, "proximity_sensor": {}"#);
     assert_eq!(mounted.light_sensor.unwrap().blocked_by, BlockedBy::Walls);
+    let distance = |config: &str| sensors(&format!(r#"{{}}, "distance_sensor": {config}"#));
+    let blocked_by = |config: &str| distance(config).distance_sensor.unwrap().blocked_by;
+    assert_eq!(blocked_by(r#"{"blocked_by": "bodies"}"#), BlockedBy::Bodies);
+    assert_eq!(blocked_by("{}"), BlockedBy::Nothing);
     assert_eq!(mounted.contact_sensor.unwrap().n_sectors, 4);
     let proximity = mounted.proximity_sensor.unwrap();
     assert_eq!((proximity.n_rays, proximity.range, proximity.angles), (8, 10.0, None));
@@ -166,7 +170,8 @@ fn everything_that_needs_bodies_says_so() {
         .replace("\"wireless_receiver\": {}", "\"wireless_receiver\": {\"blocked_by\": \"walls\"}")
         .replace(
             "\"light_sensor\": {}",
-            r#""light_sensor": {"blocked_by": "bodies"}, "proximity_sensor": {}, "contact_sensor": {}"#,
+            r#""light_sensor": {"blocked_by": "bodies"}, "distance_sensor": {"blocked_by": "walls"},
+            "proximity_sensor": {}, "contact_sensor": {}"#.replace('\n', " ").as_str(),
         )
         .replace("\"actuators\": {", "\"body\": {}, \"actuators\": {")
         .replace(
@@ -192,6 +197,7 @@ fn everything_that_needs_bodies_says_so() {
             "line 49: world.boundary",
             "line 55: world.objects.bots.sensors.wireless_receiver.blocked_by",
             "line 55: world.objects.bots.sensors.light_sensor.blocked_by",
+            "line 55: world.objects.bots.sensors.distance_sensor.blocked_by",
             "line 55: world.objects.bots.sensors.proximity_sensor",
             "line 55: world.objects.bots.sensors.contact_sensor",
             "line 56: world.objects.bots.body",

@@ -258,6 +258,30 @@ fn light_passes_walls_only_where_nothing_is_said() {
 }
 
 #[test]
+fn robots_see_each_other_through_walls_only_where_nothing_is_said() {
+    let read = |blocked_by: &str, objects: Value| {
+        let mut world = one_robot(objects);
+        let robot = &mut world["world"]["objects"]["robot"];
+        robot["num_instances"] = json!(2);
+        robot["initializers"]["positions"]["params"]["values"] = json!([[100, 75], [140, 75]]);
+        robot["sensors"]["distance_sensor"] =
+            json!({"n_sectors": 4, "range": 60, "noise_variance": 0, "blocked_by": blocked_by});
+        world["topology"]["stimuli"] = json!({"near": {"n": 4, "sensor": "distance_sensor"}});
+        world["topology"]["synapses"]["in"]["pre"] = json!(["near"]);
+        let ahead = stimuli(&world)[0];
+        assert!(ahead == 0.0 || (ahead - libm::exp(-2.0)).abs() < 1e-6, "{ahead}");
+        ahead > 0.0
+    };
+    let wall = json!({"wall": {"type": "wall", "corners": [[120, 60], [120, 90]]}});
+    let beside = json!({"wall": {"type": "wall", "corners": [[120, 76], [120, 90]]}});
+    let cask = json!({"cask": fixed("movable", [120.0, 75.0], json!({"radius": 5}))});
+    assert!(read("nothing", wall.clone()) && read("walls", beside.clone()));
+    assert!(read("bodies", beside), "the two robots do not hide each other");
+    assert!(!read("walls", wall.clone()) && !read("bodies", wall));
+    assert!(read("walls", cask.clone()) && !read("bodies", cask));
+}
+
+#[test]
 fn nobody_leaves_a_room_with_a_corner_inside() {
     let mut experiment = experiment();
     experiment["world"]["boundary"] =

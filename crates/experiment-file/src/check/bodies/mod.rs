@@ -107,6 +107,7 @@ impl Checks<'_> {
         };
         let sensors = path.key("sensors");
         let light = robot.sensors.light_sensor.as_ref().map(|sensor| sensor.blocked_by);
+        let distance = robot.sensors.distance_sensor.as_ref().map(|sensor| sensor.blocked_by);
         let receiver = robot.sensors.wireless_receiver.as_ref().map(|port| port.blocked_by);
         let blocks = |by: Option<BlockedBy>| by.is_some_and(|by| by != BlockedBy::Nothing);
         for (needs, path) in [
@@ -114,6 +115,7 @@ impl Checks<'_> {
             (robot.sensors.proximity_sensor.is_some(), sensors.key("proximity_sensor")),
             (robot.sensors.contact_sensor.is_some(), sensors.key("contact_sensor")),
             (blocks(light), sensors.key("light_sensor").key("blocked_by")),
+            (blocks(distance), sensors.key("distance_sensor").key("blocked_by")),
             (blocks(receiver), sensors.key("wireless_receiver").key("blocked_by")),
         ] {
             if needs {
