@@ -6,6 +6,7 @@ mod keys;
 mod logs;
 mod metrics;
 mod pages;
+mod platforms;
 mod programs;
 mod targets;
 mod tasks;

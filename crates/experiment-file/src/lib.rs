@@ -73,6 +73,7 @@ pub mod limits;
 mod neuron;
 mod node;
 mod parameters;
+mod platform;
 mod problem;
 mod query;
 mod read;
@@ -100,6 +101,7 @@ pub use parameters::{
     DefaultValue, Domain, Kind, Kinds, Nested, Parameter, ParameterValue, Parameters, Params,
     Table, Variants,
 };
+pub use platform::{Fact, PLATFORMS, Platform};
 pub use problem::{ConfigError, Problem};
 pub use query::*;
 pub use read::plain;

@@ -382,6 +382,21 @@ impl<'a> Object<'a> {
         self.properties.contains_key(key)
     }
 
+    /// Whether the file has a value at the end of a path of keys that the reader has not asked for
+    /// yet.
+    pub(crate) fn has_within(&self, path: &[&str]) -> bool {
+        let Some((first, rest)) = path.split_first() else { return false };
+        let first = self.properties.get(first).copied();
+        let property = |value: &'a Value<'a>, key: &&str| match value {
+            Value::Object(object) => {
+                let mut properties = object.properties.iter();
+                properties.find(|property| property.name.as_str() == *key).map(|it| &it.value)
+            }
+            _ => None,
+        };
+        rest.iter().fold(first, |value, key| property(value?, key)).is_some()
+    }
+
     pub(crate) fn required(&mut self, key: &'static str) -> Node<'a> {
         self.optional(key).unwrap_or_else(|| {
             self.problem(key, || format!("missing key `{key}`"));

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ActuatorsConfig, BodyConfig, Initializer, SensorQuery, SensorsConfig, limits, schema};
+use super::{
+    ActuatorsConfig, BodyConfig, Initializer, SensorQuery, SensorsConfig, limits, platform, schema,
+};
 use crate::DefaultValue::{Depends, Name, Null, Number, Numbers, Whole};
 use crate::parameters::{Variants, parameters};
 use crate::{Domain, ParameterValue};
@@ -13,6 +15,7 @@ use crate::{Domain, ParameterValue};
 #[schemars(
     deny_unknown_fields,
     transform = schema::optional("sensors, actuators, body, perturbations, params"),
+    transform = schema::property("platform", platform::schema()),
     transform = schema::ignored("positions, orientations")
 )]
 pub struct RobotConfig {

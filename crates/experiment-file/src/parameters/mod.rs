@@ -17,7 +17,7 @@ use crate::limits;
 
 pub(crate) use kinds::{Choice, bind, kind_table, kinds, kinds_schema, read_kind, serialize_kind};
 pub use kinds::{Kind, Kinds};
-pub(crate) use read::{Keys, defaults, inner, optional, params, points, read};
+pub(crate) use read::{Given, Keys, defaults, inner, optional, params, points, read, within};
 pub(crate) use schema::{add_part, list, object, points_schema, properties};
 pub use typed::{Nested, Parameters, Table, Variants};
 pub(crate) use typed::{key, parameters, variants};

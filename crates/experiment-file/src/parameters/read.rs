@@ -7,8 +7,15 @@ use crate::limits;
 use crate::node::{Node, Object};
 use crate::semantics::Semantics;
 
-/// Defaults, by key, of parameters whose default depends on other parts of the file.
+/// Defaults, by key, of parameters whose default depends on other parts of the file. The keys of an
+/// object within are paths, as in `body.radius`.
 pub(crate) type Given<'a> = [(&'a str, ParameterValue)];
+
+/// The same defaults for the keys of the object at `key`.
+pub(crate) fn within<'a>(given: &Given<'a>, key: &str) -> Vec<(&'a str, ParameterValue)> {
+    let inner = |path: &'a str| path.strip_prefix(key)?.strip_prefix('.');
+    given.iter().map(|(path, value)| (inner(path).unwrap_or(path), value.clone())).collect()
+}
 
 /// A place in a file that may have the keys of parameters.
 pub(crate) trait Keys<'a> {
@@ -235,7 +242,9 @@ impl Parameter {
                 node.u32(n..=n).into()
             }
             Domain::Names => ParameterValue::Names(node.names()),
-            Domain::Object(object) => (object.read)(node, semantics, given).into(),
+            Domain::Object(object) => {
+                (object.read)(node, semantics, &within(given, self.key)).into()
+            }
             Domain::Objects(object, max) => {
                 let nodes = if node.is_list() { node.list(1..=max) } else { vec![node] };
                 let one = |node| (object.read)(node, semantics, given);

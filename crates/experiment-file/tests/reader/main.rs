@@ -7,6 +7,7 @@ mod generator;
 mod hostile;
 mod original;
 mod parameters;
+mod platforms;
 mod problems;
 mod reference;
 mod schema;

@@ -75,6 +75,11 @@ pub(super) fn add_bodies(dice: &mut Dice, world: &mut Value) {
 
 /// Gives a body and its sensors to a robot.
 fn body(dice: &mut Dice, robot: &mut Value) {
+    if dice.chance(0.3) {
+        // Of the others, one is too fast and one too small for the substeps.
+        let platform = dice.pick(&["e-puck2", "pogobot"]);
+        insert(robot, "platform", json!(platform));
+    }
     if dice.chance(0.5) {
         let [radius, mass, force] =
             [dice.number(3.0, 6.0), dice.number(0.05, 2.0), dice.number(0.1, 5.0)];
@@ -82,7 +87,7 @@ fn body(dice: &mut Dice, robot: &mut Value) {
         insert(robot, "body", body);
     }
     let sensors = &mut robot["sensors"];
-    for kind in ["light_sensor", "wireless_receiver"] {
+    for kind in ["light_sensor", "distance_sensor", "wireless_receiver"] {
         if sensors.get(kind).is_some() && dice.chance(0.5) {
             let by = dice.pick(&["nothing", "walls", "bodies"]);
             insert(&mut sensors[kind], "blocked_by", json!(by));
