@@ -32,6 +32,7 @@ pub mod referee;
 mod rpc;
 mod runs;
 mod server;
+pub mod shared_genotype;
 
 use model::{codec, failpoint, queries, shared_store, submission, text};
 /// The store, and the names of its contents.

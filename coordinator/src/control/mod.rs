@@ -3,6 +3,7 @@
 //!
 //! It works on core types. Calls that only read are in [`queries`](model::queries).
 
+mod capacity;
 mod evaluate;
 mod experiment_files;
 mod explain;

@@ -9,7 +9,7 @@ use crate::{
     clock,
     ids::ExperimentId,
     limits::UNFINISHED_MAX,
-    memory::{self, Shortage},
+    memory::Shortage,
     runs::Runnable,
     store::{
         ExperimentRecord, ExperimentState, Filter, ForkRecord, NewExperiment, Store, StoreError,
@@ -17,7 +17,7 @@ use crate::{
     },
 };
 
-use super::{ControlError, reopen};
+use super::{capacity::shortage, reopen};
 
 /// The experiment that a submission leads to.
 pub enum Placement {
@@ -124,37 +124,6 @@ fn of_the_same_digest(
 fn differs_in_name_only(config_json: &str, config: &ExperimentConfig) -> bool {
     ExperimentConfig::from_json(config_json, "", ALGORITHMS)
         .is_ok_and(|(other, _)| ExperimentConfig { name: config.name.clone(), ..other } == *config)
-}
-
-/// Checks that there is room for one more unfinished experiment.
-pub fn check_room(
-    store: &Store,
-    summary: &Summary,
-    genotype_len: u64,
-    memory_budget: u64,
-) -> Result<(), ControlError> {
-    let unfinished = store.experiments(&Filter::unfinished())?;
-    if unfinished.len() >= UNFINISHED_MAX {
-        return Err(ControlError::TooManyUnfinished);
-    }
-    match shortage(&unfinished, summary, genotype_len, memory_budget) {
-        Some(shortage) => Err(ControlError::NoMemory(shortage)),
-        None => Ok(()),
-    }
-}
-
-/// The missing memory, if there is too little for another experiment.
-fn shortage(
-    unfinished: &[ExperimentRecord],
-    summary: &Summary,
-    genotype_len: u64,
-    memory_budget: u64,
-) -> Option<Shortage> {
-    // An experiment of another release does not run.
-    let taken = unfinished.iter().filter(|other| other.fingerprint == sim_core::FINGERPRINT);
-    let in_use = taken.map(|other| memory::estimate(&other.summary, other.genotype_len)).sum();
-    let needed = memory::estimate(summary, genotype_len);
-    Shortage::check(needed, in_use, memory_budget).err()
 }
 
 /// Looks for an identical experiment that can continue: an unfinished one, or one with fewer

@@ -13,7 +13,7 @@ use crate::{
     store::{ExperimentRecord, ExperimentState, Store, StoreError, StoredExperiment},
 };
 
-use super::{Control, ControlError, placement};
+use super::{Control, ControlError, capacity};
 
 /// Why an ended experiment continues.
 #[derive(Debug, Clone, Copy)]
@@ -68,7 +68,7 @@ fn prepare(
         )));
     }
     // More generations need no more memory.
-    placement::check_room(store, &experiment.summary, experiment.genotype_len, memory_budget)?;
+    capacity::check_room(store, &experiment.summary, experiment.genotype_len, memory_budget)?;
     let runnable = runnable(store, id, &config_json)?;
     let why = match reopening {
         Reopening::Extend(generations) => format!("extended to {generations} generations"),

@@ -10,8 +10,8 @@ use sim_core::TrialSet;
 use crate::ids::{JobId, WorkerId};
 
 use super::{
-    Engine, availability::Availability, batch::BatchInProgress, job::JobWork, trust::OpenQuestion,
-    worker::Worker,
+    Engine, availability::Availability, batch::BatchInProgress, job::JobWork,
+    trust::questions::OpenQuestion, worker::Worker,
 };
 
 /// The present activity of a job, and the workers that could compute it.
@@ -106,7 +106,7 @@ impl Engine {
     /// The activity of a job; without a batch if the engine does not know the job.
     pub fn activity(&self, now: Instant, id: JobId) -> JobActivity {
         let work = self.jobs.get(&id);
-        let usable = self.workers.values().filter(|worker| worker.is_usable());
+        let usable = self.workers.values().filter(|worker| worker.availability().is_usable());
         let (takers, others): (Vec<&Worker>, Vec<&Worker>) =
             usable.partition(|worker| work.is_none_or(|work| worker.takes(work)));
         let questions = self.trust.questions.about(id);

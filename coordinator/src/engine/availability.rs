@@ -4,8 +4,6 @@ use std::time::Instant;
 
 use crate::ids::QuestionId;
 
-use super::worker::Worker;
-
 /// Whether a worker gets items; if not, the first reason that applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Availability<'a> {
@@ -43,55 +41,53 @@ pub struct Obstacles {
     pub is_on_probation: bool,
 }
 
-impl Worker {
+impl Obstacles {
     /// Whether the worker gets items.
     pub fn availability(&self) -> Availability<'_> {
-        match &self.obstacles {
-            Obstacles { is_draining: true, .. } => Availability::Draining,
-            Obstacles { quarantined: Some(reason), .. } => Availability::Quarantined(reason),
-            Obstacles { is_stalled: true, .. } => Availability::Stalled,
-            Obstacles { question: Some(_), .. } => Availability::Doubted,
-            Obstacles { resting_until: Some(until), .. } => Availability::Resting(*until),
-            Obstacles { is_on_probation: true, .. } => Availability::OnProbation,
+        match self {
+            Self { is_draining: true, .. } => Availability::Draining,
+            Self { quarantined: Some(reason), .. } => Availability::Quarantined(reason),
+            Self { is_stalled: true, .. } => Availability::Stalled,
+            Self { question: Some(_), .. } => Availability::Doubted,
+            Self { resting_until: Some(until), .. } => Availability::Resting(*until),
+            Self { is_on_probation: true, .. } => Availability::OnProbation,
             _ => Availability::Free,
         }
     }
+}
 
+impl Availability<'_> {
     /// Whether the worker may get items now.
-    pub fn is_usable(&self) -> bool {
-        matches!(self.availability(), Availability::Free | Availability::OnProbation)
+    pub fn is_usable(self) -> bool {
+        matches!(self, Self::Free | Self::OnProbation)
     }
 
     /// Whether audits wait for the worker: it may get items now, or soon.
-    pub fn may_audit(&self) -> bool {
-        self.is_usable()
-            || matches!(self.availability(), Availability::Doubted | Availability::Resting(_))
+    pub fn may_audit(self) -> bool {
+        self.is_usable() || matches!(self, Self::Doubted | Self::Resting(_))
     }
 
-    /// Why the worker gets nothing for a while, for people.
-    pub fn waits(&self, now: Instant) -> Option<String> {
-        match self.availability() {
-            Availability::Stalled => {
-                let silent = self.last_result.unwrap_or(self.time.joined());
-                let seconds = now.saturating_duration_since(silent).as_secs();
+    /// Why the worker gets nothing for a while, for people. `silent_since`: its last result, or
+    /// its introduction.
+    pub fn waits(self, silent_since: Instant, now: Instant) -> Option<String> {
+        match self {
+            Self::Stalled => {
+                let seconds = now.saturating_duration_since(silent_since).as_secs();
                 Some(format!(
                     "it has returned nothing for {seconds} s while others have; it gets items \
                      again after its next result"
                 ))
             }
-            Availability::Doubted => {
+            Self::Doubted => {
                 Some("one of its results is in doubt until the referee has answered".to_owned())
             }
-            Availability::Resting(until) => {
+            Self::Resting(until) => {
                 let left = until.saturating_duration_since(now).as_secs_f64();
                 Some(format!(
                     "it was lost, and has returned nothing since; it gets an item in {left:.1} s"
                 ))
             }
-            Availability::Draining
-            | Availability::Quarantined(_)
-            | Availability::OnProbation
-            | Availability::Free => None,
+            Self::Draining | Self::Quarantined(_) | Self::OnProbation | Self::Free => None,
         }
     }
 }

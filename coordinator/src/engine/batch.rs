@@ -12,13 +12,14 @@ use sim_core::{Output, TrialSet};
 use crate::ids::{AssignmentId, WorkerId};
 
 use super::{
-    Batch, EvaluatedBatch, SharedGenotype,
+    Batch, EvaluatedBatch,
     fleet_time::FleetTime,
     item::{Item, ItemState},
     known_results::KnownResults,
     queue::Queue,
-    trust::{Audits, LossRecord},
+    trust::{audits::Audits, losses::LossRecord},
 };
+use crate::shared_genotype::SharedGenotype;
 
 /// Most numbers per item of measures: half a MiB, because messages have a limited size.
 const VALUES_PER_ITEM: usize = 1 << 16;

@@ -7,7 +7,7 @@ use std::{
 
 use crate::priority::Priority;
 
-use super::{batch::BatchInProgress, item::Item, trust::Unaudited};
+use super::{batch::BatchInProgress, item::Item, trust::unaudited::Unaudited};
 
 /// Overhead of a call, in trials. Measured: a single trial of the shipped experiments takes 1.38
 /// to 1.8 times as long as one of several in a call.

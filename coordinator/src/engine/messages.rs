@@ -1,18 +1,13 @@
 //! The engine's inputs and outputs, as plain data.
 
-use std::{
-    fmt,
-    num::NonZeroU64,
-    ops::{Deref, Range},
-    sync::Arc,
-    time::Duration,
-};
+use std::{num::NonZeroU64, ops::Range, sync::Arc, time::Duration};
 
 use sim_core::{Output, TrialSet};
 
 use crate::{
     ids::{AssignmentId, JobId, QuestionId, WorkerId},
     referee::RefereeRequest,
+    shared_genotype::SharedGenotype,
 };
 use evolution::{Genotype, Population};
 
@@ -174,41 +169,6 @@ pub struct Assignment {
     /// Whether the worker draws the genotype from the job's latest distribution, instead of
     /// receiving it.
     pub is_drawn: bool,
-}
-
-/// One genotype of a population, without a copy of its genes.
-#[derive(Clone)]
-pub struct SharedGenotype {
-    /// The genotypes of all individuals.
-    pub population: Population,
-    /// Index of the individual among them.
-    pub individual: u32,
-}
-
-impl From<Genotype> for SharedGenotype {
-    fn from(genotype: Genotype) -> Self {
-        Self { population: [genotype].into(), individual: 0 }
-    }
-}
-
-impl Deref for SharedGenotype {
-    type Target = Genotype;
-
-    fn deref(&self) -> &Genotype {
-        &self.population[self.individual as usize]
-    }
-}
-
-impl PartialEq for SharedGenotype {
-    fn eq(&self, other: &Self) -> bool {
-        **self == **other
-    }
-}
-
-impl fmt::Debug for SharedGenotype {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        (**self).fmt(f)
-    }
 }
 
 /// A worker's result for an assignment.

@@ -75,7 +75,7 @@ use job::JobWork;
 use load_index::WorkerLoadIndex;
 pub use messages::{
     Assignment, Assignments, Batch, Command, EvaluatedBatch, FleetSize, Introduction, ItemResult,
-    SharedGenotype, ToWorker, WorkerStatus,
+    ToWorker, WorkerStatus,
 };
 pub use name_pattern::NamePattern;
 use outgoing::Outgoing;
@@ -84,8 +84,8 @@ use results::NoResult;
 pub use stats::{Counters, FleetStats, JobStats};
 use timeline::Timeline;
 pub use timeline::{Fate, TimelineEntry};
-pub use trust::OpenQuestion;
 use trust::Trust;
+pub use trust::questions::OpenQuestion;
 use worker::Worker;
 
 /// The configuration of an engine.
@@ -316,7 +316,7 @@ impl Engine {
     }
 
     fn has_usable_worker(&self) -> bool {
-        self.workers.values().any(Worker::is_usable)
+        self.workers.values().any(|worker| worker.availability().is_usable())
     }
 
     /// Wakes workers that have rested long enough, or that are the only ones.

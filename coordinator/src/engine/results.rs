@@ -15,7 +15,7 @@ use super::{
     in_flight::{AssignedItem, ItemKind},
     item::{Item, ItemState},
     timeline::Fate,
-    trust::{AfterLoss, Doubt, is_audited},
+    trust::{audits::is_audited, losses::AfterLoss, questions::Doubt},
     worker::Worker,
 };
 
@@ -235,8 +235,9 @@ impl Engine {
             // In a fleet that is divided among experiments, the auditors seen last may not take
             // this one.
             let is_awaited = is_in_grace && workers.values().all(|worker| worker.takes(job));
-            let mut auditors =
-                workers.values().filter(|worker| worker.may_audit() && worker.takes(job));
+            let mut auditors = workers
+                .values()
+                .filter(|worker| worker.availability().may_audit() && worker.takes(job));
             is_awaited || auditors.any(|worker| batch.audits.has_for(worker.name()))
         };
         if !batch.is_finished(has_auditor) {

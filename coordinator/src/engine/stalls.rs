@@ -18,7 +18,7 @@ impl Engine {
         let mut idle = self
             .workers
             .iter()
-            .filter(|(_, worker)| worker.is_usable() && worker.in_flight.is_empty());
+            .filter(|(_, worker)| worker.availability().is_usable() && worker.in_flight.is_empty());
         let has_idle = idle.next().is_some();
         let mut latest: Vec<(Instant, WorkerId)> = self
             .workers
@@ -57,8 +57,9 @@ impl Engine {
         let takes = work.expected(oldest.item.trials.len(), worker.pace)?;
         let first = work.batch.as_ref()?.computed_by(&oldest.item);
         let mut others = self.workers.iter().filter(|&(&other, _)| other != id);
-        let is_auditor =
-            |other: &Worker| other.is_usable() && other.takes(work) && Some(other.name()) != first;
+        let is_auditor = |other: &Worker| {
+            other.availability().is_usable() && other.takes(work) && Some(other.name()) != first
+        };
         let (times, more) = if oldest.is_audit() && !others.any(|(_, other)| is_auditor(other)) {
             PATIENCE_WITH_AUDITOR
         } else {

@@ -86,6 +86,16 @@ impl Worker {
         self.introduction.n_slots
     }
 
+    /// Whether it gets items.
+    pub fn availability(&self) -> Availability<'_> {
+        self.obstacles.availability()
+    }
+
+    /// Why it gets nothing for a while, for people.
+    pub fn waits(&self, now: Instant) -> Option<String> {
+        self.availability().waits(self.last_result.unwrap_or(self.time.joined()), now)
+    }
+
     /// Whether it takes items of this job.
     pub fn takes(&self, job: &JobWork) -> bool {
         self.introduction.experiments.matches(&job.name)
@@ -113,7 +123,7 @@ impl Worker {
 
     /// Whether it may be given another item.
     pub fn has_credit(&self) -> bool {
-        self.is_usable() && self.n_items() < self.n_credits()
+        self.availability().is_usable() && self.n_items() < self.n_credits()
     }
 
     /// Number of items in progress or waiting at the worker.

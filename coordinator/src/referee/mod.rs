@@ -26,7 +26,7 @@ pub use child::serve_stdio;
 use sim_core::{Output, TrialSet};
 pub use supervisor::Referee;
 
-use crate::engine::SharedGenotype;
+use crate::shared_genotype::SharedGenotype;
 
 /// The program of a referee process, which must call [`serve_stdio`].
 #[derive(Debug, Clone, PartialEq, Eq)]

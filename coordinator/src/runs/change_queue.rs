@@ -9,8 +9,6 @@ use crate::{
     store::{ExperimentState, Store, StoreError},
 };
 
-use super::RequestId;
-
 /// Changes that are being written or wait. The number of requests bounds them, because each client
 /// waits for its own change.
 #[derive(Debug, Default)]
@@ -44,6 +42,10 @@ pub enum Request {
     /// Change nothing; answer once all earlier changes are stored.
     Settle,
 }
+
+/// A client's request that waits for an answer; the caller chooses the id.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct RequestId(pub u64);
 
 /// A change of an unfinished experiment.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use crate::{
     store::ExperimentState,
 };
 
-use super::{Change, ReadyToCommit, Round};
+use super::{Change, ReadyToCommit, RequestId, Round};
 
 /// A request to the driver. Commands with a job are for the engine.
 #[derive(Debug)]
@@ -138,10 +138,6 @@ pub struct RunId {
     /// Counts runs since the coordinator started.
     pub run_epoch: u64,
 }
-
-/// A client's request that waits for an answer; the caller chooses the id.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct RequestId(pub u64);
 
 /// The outcome of a commit.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -49,9 +49,9 @@ use crate::{
     store::ExperimentState,
 };
 
-pub use change_queue::{Change, PendingChange, Request};
+pub use change_queue::{Change, PendingChange, Request, RequestId};
 pub use evaluations::Evaluation;
-pub use messages::{Command, CommitOutcome, RequestId, RunId};
+pub use messages::{Command, CommitOutcome, RunId};
 pub use round::{Next, ReadyToCommit, Round, completion, describe, describe_judgement};
 pub use runnable::Runnable;
 pub use stats::RunStats;

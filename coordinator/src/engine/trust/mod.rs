@@ -16,13 +16,13 @@
 //! | the referee answers | `verdicts.rs` | the item fails its job, or a worker is quarantined (`quarantine.rs`) |
 //! | a result comes in | `audits.rs`, `unaudited.rs` | a second worker computes a share of the results, too |
 
-mod audits;
+pub mod audits;
 mod crash_loops;
 mod doubts;
-mod losses;
+pub mod losses;
 mod quarantine;
-mod questions;
-mod unaudited;
+pub mod questions;
+pub mod unaudited;
 mod verdicts;
 
 use std::time::{Duration, Instant};
@@ -33,13 +33,6 @@ use super::{
 use crate::ids::{JobId, WorkerId};
 
 use self::{crash_loops::CrashLoops, quarantine::Quarantine, questions::Questions};
-
-pub use self::{
-    audits::{Audits, is_audited},
-    losses::{AfterLoss, LossRecord},
-    questions::{Doubt, OpenQuestion},
-    unaudited::Unaudited,
-};
 
 /// Time that an audit waits for a second worker to connect or reconnect. Without this wait, a lying
 /// worker could escape audits by being the first to connect after the coordinator's start.
@@ -107,7 +100,7 @@ impl Engine {
 
     /// Updates the last time at which two workers could audit each other.
     pub(super) fn note_auditors(&mut self, now: Instant) {
-        let mut auditors = self.workers.values().filter(|worker| worker.may_audit());
+        let mut auditors = self.workers.values().filter(|worker| worker.availability().may_audit());
         let first = auditors.next().map(Worker::name);
         if auditors.any(|worker| Some(worker.name()) != first) {
             self.trust.auditors_seen = now;
