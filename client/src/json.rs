@@ -59,15 +59,19 @@ impl<'a> LogLine<'a> {
     }
 }
 
-/// A generation, as `run`, `watch` and `history` print it.
+/// A generation, as `run`, `watch`, `list` and `history` print it.
 #[derive(Debug, Serialize)]
 pub struct GenerationLine<'a> {
     experiment: u64,
     #[serde(flatten, serialize_with = "GenerationFields::serialize")]
     summary: &'a GenerationSummary,
+    /// Only `history` prints it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    completed_at_ms: Option<u64>,
 }
 
-/// The fields of the message, in the order of the printed keys.
+/// The fields of the message, in the order of the printed keys. It is no type of a value: Serde
+/// takes the order of keys from a declaration, and the message has another one.
 #[derive(Serialize)]
 #[serde(remote = "GenerationSummary")]
 struct GenerationFields {
@@ -85,7 +89,11 @@ struct GenerationFields {
 
 impl<'a> GenerationLine<'a> {
     pub fn new(experiment_id: u64, summary: &'a GenerationSummary) -> Self {
-        Self { experiment: experiment_id, summary }
+        Self { experiment: experiment_id, summary, completed_at_ms: None }
+    }
+
+    pub fn completed_at(self, ms: u64) -> Self {
+        Self { completed_at_ms: Some(ms), ..self }
     }
 }
 

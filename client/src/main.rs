@@ -57,12 +57,12 @@ use clap_complete::CompleteEnv;
 use swarm_telemetry::{block_on, report, runtime};
 
 use crate::{
-    cli::Args, error::Error, local::services::PROGRAMS, progress::Progress,
+    cli::Args,
+    error::Error,
+    local::services::{PROGRAMS, Program},
+    progress::Progress,
     synonyms::with_suggestions,
 };
-
-/// A program, as a function of its command line.
-type Program = fn(Vec<OsString>) -> ExitCode;
 
 fn main() -> ExitCode {
     if let Some((main, words)) = other_program(env::args_os().collect()) {

@@ -70,7 +70,9 @@ pub mod services {
     use tonic::transport::Channel;
 
     use super::{Error, Infallible, missing};
-    use crate::Program;
+
+    /// A program, as a function of its command line.
+    pub type Program = fn(Vec<OsString>) -> ExitCode;
 
     /// The other programs, which this build lacks.
     pub const PROGRAMS: [(&str, Program); 2] =

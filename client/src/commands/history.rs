@@ -3,7 +3,6 @@
 mod dynamics;
 
 use clap::Args;
-use serde::Serialize;
 use swarm_proto::v1::GenerationSummary;
 
 use crate::{
@@ -33,14 +32,6 @@ const CSV_KEYS: [&str; 12] = [
     "idle_share",
     "digest",
 ];
-
-/// A completed generation.
-#[derive(Debug, Serialize)]
-struct Record<'a> {
-    #[serde(flatten)]
-    generation: json::GenerationLine<'a>,
-    completed_at_ms: u64,
-}
 
 /// Print every completed generation of an experiment, or of all of a group.
 #[derive(Debug, Args)]
@@ -87,11 +78,10 @@ impl Remote for HistoryArgs {
                 rows.push((experiment.id, summary, completed.completed_at_ms));
             }
         }
-        let records: Vec<Record<'_>> = rows
+        let records: Vec<_> = rows
             .iter()
             .map(|&(experiment_id, ref summary, completed_at_ms)| {
-                let generation = json::GenerationLine::new(experiment_id, summary);
-                Record { generation, completed_at_ms }
+                json::GenerationLine::new(experiment_id, summary).completed_at(completed_at_ms)
             })
             .collect();
         let empty = "no generation is complete yet";

@@ -1,9 +1,14 @@
 //! The services of a coordinator in this process.
 
+use std::{ffi::OsString, process::ExitCode};
+
 use coordinator::StartError;
 pub use coordinator::{Door, InProcess};
 
-use crate::{Program, error::Error};
+use crate::error::Error;
+
+/// A program, as a function of its command line.
+pub type Program = fn(Vec<OsString>) -> ExitCode;
 
 /// The other programs in this one. `run` needs the code of coordinator and worker anyway, so a
 /// release is one file with three names.
