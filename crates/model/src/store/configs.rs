@@ -2,10 +2,7 @@
 
 use rusqlite::{Transaction, params};
 
-use super::{
-    schema::summary,
-    seals::{self, Sealer},
-};
+use super::{schema::summary, sealing, seals::Sealer};
 use crate::ids::ExperimentId;
 
 /// Puts the file of an experiment, in canonical form, beside its row, and seals the row. The row
@@ -25,5 +22,5 @@ pub fn put(
         " FROM configs WHERE experiment_id = id) WHERE id = ?1"
     );
     transaction.prepare_cached(sql)?.execute([id.0])?;
-    seals::seal_experiment(transaction, sealer, id)
+    sealing::seal_experiment(transaction, sealer, id)
 }

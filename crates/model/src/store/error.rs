@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::file::Holder;
+use super::Holder;
 use crate::ids::ExperimentId;
 
 /// An error of the store.

@@ -2,9 +2,8 @@
 //! stays untouched if it is damaged.
 
 use std::{
-    fmt,
     fs::{self, File, TryLockError},
-    io::{self, Read as _, Seek as _, SeekFrom, Write as _},
+    io::{self, Seek as _, SeekFrom, Write as _},
     path::{Path, PathBuf},
     thread,
     time::Duration,
@@ -12,8 +11,7 @@ use std::{
 
 use rusqlite::{Connection, OpenFlags};
 
-use super::{Result, StoreError, schema, write_ahead_log};
-use crate::text::printable;
+use super::{Holder, Result, StoreError, schema, write_ahead_log};
 
 const DATABASE_FILE: &str = "swarmevo.sqlite3";
 /// The name of a database until it is complete.
@@ -26,8 +24,6 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 const LOCK_ATTEMPTS: u32 = 10;
 /// Pause between two attempts.
 const LOCK_PAUSE: Duration = Duration::from_millis(20);
-/// Longest text in a lock file, bytes.
-const HOLDER_LEN_MAX: u64 = 512;
 
 /// Fails if there is no database at `path`, or if it cannot be accessed.
 pub fn must_exist(path: &Path) -> Result<()> {
@@ -48,15 +44,6 @@ pub struct Locks {
     _database: Option<File>,
 }
 
-/// The program that may write to a database.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Holder {
-    /// Its process id, if known.
-    pub process: Option<u32>,
-    /// Its address for clients, if it is a coordinator.
-    pub address: Option<String>,
-}
-
 impl Locks {
     /// Writes the holder's name into the lock file. The lock also works without a name.
     pub fn announce(&self, address: Option<&str>) {
@@ -67,32 +54,6 @@ impl Locks {
             .and_then(|()| file.seek(SeekFrom::Start(0)))
             .and_then(|_| file.write_all(text.as_bytes()));
         drop(written);
-    }
-}
-
-impl Holder {
-    /// Reads the holder from a lock file.
-    fn named(file: &File) -> Self {
-        let mut text = String::new();
-        let mut file = file;
-        // An unreadable file names no holder.
-        let _ = file.seek(SeekFrom::Start(0));
-        let _ = file.take(HOLDER_LEN_MAX).read_to_string(&mut text);
-        let mut lines = text.lines();
-        Self {
-            process: lines.next().and_then(|line| line.parse().ok()),
-            address: lines.next().filter(|line| !line.is_empty()).map(printable),
-        }
-    }
-}
-
-impl fmt::Display for Holder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.address, self.process) {
-            (Some(address), _) => write!(f, "the coordinator at {address}"),
-            (None, Some(process)) => write!(f, "process {process}"),
-            (None, None) => f.write_str("another program"),
-        }
     }
 }
 

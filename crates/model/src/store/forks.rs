@@ -3,23 +3,10 @@
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 use super::{
-    LogGap, Result, StoreError, fitness_log, history,
+    ForkRecord, LogGap, Result, StoreError, fitness_log, history,
     seals::{Seal, Sealer},
 };
 use crate::ids::ExperimentId;
-
-/// The origin of a fork, an experiment that continues the state of another one, its parent.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ForkRecord {
-    /// The parent.
-    pub parent: ExperimentId,
-    /// The last generation that it shares with the parent.
-    pub generation: u64,
-    /// The link of the digest chain before its own first generation.
-    pub link: String,
-    /// The changes of the experiment file, one line each.
-    pub changes: Vec<String>,
-}
 
 /// Checks that no fork shares a generation from `first` on with an experiment.
 pub fn check_unneeded(connection: &Connection, id: ExperimentId, first: u64) -> Result<()> {

@@ -15,12 +15,14 @@ mod file;
 mod fitness_log;
 mod forks;
 mod history;
+mod holder;
 pub(crate) mod inspection;
 mod labels;
 mod older_schemas;
 mod quarantine;
 mod records;
 mod schema;
+mod sealing;
 mod seals;
 mod soundness;
 mod summary;
@@ -37,16 +39,16 @@ pub use error::StoreError;
 use events::{add_notice, add_state_event, set_state};
 pub use evidence::Imported;
 pub use experiments::Filter;
-pub use file::{Holder, holder};
+pub use file::holder;
 pub use fitness_log::Entry;
-pub use forks::ForkRecord;
+pub use holder::Holder;
 pub use inspection::{
     Backup, Fate, Finding, Inspection, Recovered, Recovery, backup, inspect, recover,
 };
 pub use quarantine::QuarantinedWorker;
 pub use records::{
-    Event, EventKind, Evidence, ExperimentRecord, ExperimentState, GenerationRecord, LogEntry,
-    LogGap, NewExperiment, StoredExperiment,
+    Event, EventKind, Evidence, ExperimentRecord, ExperimentState, ForkRecord, GenerationRecord,
+    LogEntry, LogGap, NewExperiment, StoredExperiment,
 };
 pub use summary::Summary;
 

@@ -5,7 +5,7 @@ use std::ops::Deref;
 use bundle::Keyframes;
 use experiment_file::ExperimentConfig;
 
-use super::{ForkRecord, Summary};
+use super::Summary;
 use crate::{group::Membership, ids::ExperimentId, labels::Labels, priority::Priority};
 use evolution::{Champion, Digest, Statistics};
 
@@ -204,6 +204,19 @@ impl LogGap {
             .into_iter()
             .find(|gap| gap.name() == name)
     }
+}
+
+/// The origin of a fork, an experiment that continues the state of another one, its parent.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ForkRecord {
+    /// The parent.
+    pub parent: ExperimentId,
+    /// The last generation that it shares with the parent.
+    pub generation: u64,
+    /// The link of the digest chain before its own first generation.
+    pub link: String,
+    /// The changes of the experiment file, one line each.
+    pub changes: Vec<String>,
 }
 
 /// A completed generation.

@@ -2,7 +2,7 @@
 
 use rusqlite::{Connection, TransactionBehavior};
 
-use super::{StoreError, seals};
+use super::{StoreError, sealing};
 
 /// Makes the column `summary` from a column `config`: a list of the fields of
 /// [`Summary`](super::Summary). `->` keeps all digits of a seed. This is part of a migration, so
@@ -405,7 +405,7 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
         }
         // Sealing reads the latest tables.
         if (found as i64) < SEALED {
-            seals::seal_all(&transaction)?;
+            sealing::seal_all(&transaction)?;
         }
         let n_dangling: i64 =
             transaction

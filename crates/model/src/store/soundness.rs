@@ -5,8 +5,7 @@ use rusqlite::{Connection, params};
 
 use super::{
     ExperimentState, Result, Store, StoreError, StoredExperiment, add_notice, add_state_event,
-    experiments, fitness_log, forks,
-    seals::{self, Sealer},
+    experiments, fitness_log, forks, sealing, seals::Sealer,
 };
 use crate::ids::ExperimentId;
 
@@ -64,7 +63,7 @@ pub fn resumable(
         other => other?,
     };
     let Some(found) = found else { return Ok(Err("it does not exist".to_owned())) };
-    let (seal, expected) = seals::experiment_seal(connection, sealer, id)?;
+    let (seal, expected) = sealing::experiment_seal(connection, sealer, id)?;
     if seal != expected {
         return Ok(Err("its configuration is not what was stored".to_owned()));
     }

@@ -7,9 +7,7 @@ use rusqlite::{Connection, Row};
 use super::{
     super::{
         ExperimentState, ForkRecord, GenerationRecord, LogGap, StoreError, champions, forks,
-        history,
-        seals::{self, Sealer},
-        soundness,
+        history, sealing, seals::Sealer, soundness,
     },
     log::{self, SoundLog},
     source::Source,
@@ -242,7 +240,7 @@ fn read_row(
     let row = ExperimentRow { fork, ..row };
     if let Some(sealer) = sealer {
         let (seal, expected) =
-            seals::experiment_seal(connection, sealer, id).map_err(&unreadable)?;
+            sealing::experiment_seal(connection, sealer, id).map_err(&unreadable)?;
         if seal != expected {
             return Err("its configuration is not what was stored".to_owned());
         }
