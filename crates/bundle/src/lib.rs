@@ -83,6 +83,10 @@ pub struct ForkOf {
 }
 
 /// A row of the history, with the columns of `history.csv`.
+///
+/// It is not the row of the database, for two reasons: `csv` cannot flatten statistics into
+/// columns, and digests are checked here, while in the database one damaged digest must not make a
+/// list of experiments unreadable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GenerationRow {

@@ -84,7 +84,7 @@ impl ExperimentAnswer {
     }
 }
 
-/// A generation as a row of a chart: number, best, mean, min, standard deviation, duration
+/// A generation as a row of a chart, without keys because a page gets thousands: number, best, mean, min, standard deviation, duration
 /// in ms, episodes, time of completion in ms since 1970 UTC.
 pub type GenerationRow = (u64, f64, f64, f64, f64, u64, u64, u64);
 
