@@ -2,8 +2,10 @@
 //! share one pass over the weights.
 
 mod recorder;
+mod witness;
 
 pub(crate) use recorder::{AllMeasures, FitnessOnly, Recorder, Viewer};
+pub(crate) use witness::testify;
 
 use std::ops::Range;
 

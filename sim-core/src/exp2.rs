@@ -14,7 +14,7 @@ const ROUND: f32 = 12_582_912.0 + 127.0;
 const SIGNIFICAND_BITS: u32 = 23;
 /// (2^f - 1) / f for |f| <= 1/2, lowest power first: minimax for the relative
 /// error of 2^f, which is 2.0e-9.
-const COEFFICIENTS: [f32; 6] =
+pub const COEFFICIENTS: [f32; 6] =
     [LN_2, 0.240_226_48, 0.055_503_324, 0.009_618_437, 0.001_339_887_4, 0.000_153_533_69];
 
 /// s * (1 + q * f) = 2^y, with s a power of two and |f| at most one half.

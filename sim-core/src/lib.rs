@@ -67,11 +67,13 @@
 //! `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`, `fitness`. All
 //! modules use `determinism`'s random streams, `torus`, `neighbours` (robots within reach of each
 //! other), and the arithmetic on vectors of robots: `lanes` has the vectors, `exp2` the base of
-//! activation functions. `bench` opens the kernel to the benchmarks.
+//! activation functions. [`blueprint`] gives a controller away as numbers, and `testimony` what each
+//! robot perceived and did, so that other programs can prove to do the same. `bench` opens the kernel to the benchmarks.
 
 mod alpha_shape;
 #[doc(hidden)]
 pub mod bench;
+pub mod blueprint;
 mod bodies;
 mod border;
 mod communication;
@@ -101,6 +103,7 @@ mod specified;
 mod starts;
 mod stepping;
 mod swarm;
+mod testimony;
 #[cfg(test)]
 mod testing;
 mod torus;
@@ -118,6 +121,7 @@ pub use simulation::{EvaluateError, Simulation};
 pub use specified::{SpecifiedSimulation, panic_to_failure};
 pub use starts::{TRYING_TIME_MAX, Tried};
 pub use stepping::{Actions, Policy, StepError, Stepper};
+pub use testimony::{Frame, HeardFrame, RadioTestimony, Testimony};
 pub use torus::Vec2;
 
 /// Identifies the function that this crate computes. Its version is that of the first release that

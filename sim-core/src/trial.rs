@@ -3,6 +3,7 @@
 mod address;
 mod interior;
 mod starts;
+mod witness;
 
 use std::{mem, ops::Range};
 

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::blueprint::{Radio, RadioReceiver, Transmitter};
 use crate::bodies::{Chassis, Room};
 use crate::communication::{Antenna, Quantiser, Receiver};
 use crate::drive::Drive;
@@ -10,7 +11,7 @@ use crate::network::Network;
 use crate::objects::{Site, StaticObjects};
 use crate::problems::Problems;
 use crate::sensors::{self, Decay, MountedSensor};
-use crate::torus::Torus;
+use crate::torus::{Torus, Vec2};
 use experiment_file::{
     AlgorithmConfig, BlockedBy, BodyConfig, Boundary, GroundAreaConfig, LightController,
     LightSourceConfig, ObjectConfig, PerturbationsConfig, RobotConfig, RobotController,
@@ -194,6 +195,23 @@ impl World {
         let sensors = self.groups.iter().flat_map(|group| &group.sensors);
         let ranges = receivers.map(|receiver| receiver.range);
         ranges.chain(sensors.map(|mounted| mounted.sensor.robots_within())).fold(0.0, f64::max)
+    }
+
+    /// The radio of the robots of a group, as numbers.
+    pub fn radio_of(&self, group: &RobotGroup) -> Radio {
+        let antenna = group.robots.clone().next().map(|robot| self.antennas[robot]);
+        let antenna = antenna.unwrap_or_default();
+        let receiver = antenna.receiver.map(|receiver| RadioReceiver {
+            directions: receiver.directions().map(|Vec2 { x, y }| [x, y]).collect(),
+            max_hops: receiver.max_hops,
+            sending_direction: receiver.sending_direction,
+        });
+        let transmitter = antenna.emits_within.map(|_| Transmitter {
+            quantiser: group.quantiser.as_ref().map(Quantiser::lattice),
+            sending_steps: group.sending_steps,
+            initial_frame: group.initial_frame,
+        });
+        Radio { message_len: self.message_len, receiver, transmitter }
     }
 
     /// Whether anything may be between a receiver and the robots that it hears.

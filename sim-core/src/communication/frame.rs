@@ -47,6 +47,11 @@ impl Ether {
         }
     }
 
+    /// Components of a message.
+    pub fn message_len(&self) -> usize {
+        self.message_len
+    }
+
     /// The origin of a robot's frame; `NOTHING` for the number after the last robot.
     pub fn origin(&self, emitter: usize) -> FrameOrigin {
         self.origins[emitter]

@@ -179,9 +179,8 @@ impl Hearing {
 impl Listeners {
     fn new(robots: Range<usize>, receiver: Receiver, nobody: Heard) -> Self {
         let n_sectors = receiver.n_sectors;
-        let angles = (0..n_sectors).map(|sector| sector_angle(sector, n_sectors));
-        let angles: Vec<f64> = angles.collect();
-        let directions = angles.iter().map(|&angle| Vec2::unit(angle)).collect();
+        let angles = (0..n_sectors).map(|sector| sector_angle(sector, n_sectors)).collect();
+        let directions = receiver.directions().collect();
         let heard = vec![nobody; robots.len() * n_sectors];
         Self { robots, receiver, heard, angles, directions }
     }

@@ -4,6 +4,7 @@ use std::f64::consts::LOG2_E;
 
 use pulp::{Simd, WithSimd};
 
+use crate::blueprint::Lattice;
 use crate::exp2::exp2;
 use determinism::Isa;
 
@@ -15,6 +16,7 @@ pub(crate) struct Quantiser {
     /// A point's weight is 2^(slope * distance), up to a common factor.
     slope: f32,
     message_len: usize,
+    n_levels: usize,
     /// `[point][component]`, row-major: the last component runs fastest.
     points: Vec<f64>,
 }
@@ -38,7 +40,13 @@ impl Quantiser {
             }
         }
         let slope = (-beta * LOG2_E / (message_len as f64).sqrt()) as f32;
-        Self { slope, message_len, points }
+        Self { slope, message_len, n_levels, points }
+    }
+
+    /// The lattice as numbers.
+    pub fn lattice(&self) -> Lattice {
+        let level = |index| index as f64 / (self.n_levels - 1) as f64;
+        Lattice { slope: self.slope, levels: (0..self.n_levels).map(level).collect() }
     }
 
     /// Replaces the messages `[robot][component]`, clipped to \[0, 1\], by the

@@ -3,15 +3,24 @@
 
 use super::Mode;
 use super::frame::{Ether, FrameOrigin};
-use super::hearing::{Antenna, Hearing};
+use super::hearing::{Antenna, Heard, Hearing, Listeners, Receiver};
 use super::quantisation::Scratch;
 use crate::neighbours::Neighbours;
 use crate::swarm::{Received, Swarm};
-use crate::torus::Vec2;
+use crate::testimony::{Frame, HeardFrame};
+use crate::torus::{Vec2, sector_angle};
 use crate::world::{RobotGroup, World};
 use determinism::Isa;
 use determinism::random::Stream;
 use experiment_file::SendingDirection;
+
+impl Receiver {
+    /// (cos, sin) of each sector in its robot's own frame of reference.
+    pub fn directions(&self) -> impl Iterator<Item = Vec2> + use<> {
+        let n_sectors = self.n_sectors;
+        (0..n_sectors).map(move |sector| Vec2::unit(sector_angle(sector, n_sectors)))
+    }
+}
 
 /// State of the wireless link.
 #[derive(Debug)]
@@ -124,6 +133,57 @@ impl Radio {
                 });
             }
         }
+    }
+
+    /// The strongest frame in each sector of a robot; empty without a receiver.
+    pub fn heard(
+        &self,
+        robot: usize,
+        neighbours: &Neighbours,
+        headings: &[f64],
+    ) -> Vec<HeardFrame> {
+        let mut listeners = self.hearing.listeners().iter();
+        let own = listeners.find_map(|listeners| {
+            let (_, heard) = listeners.iter().find(|(listener, _)| *listener == robot)?;
+            Some((listeners, heard))
+        });
+        let Some((listeners, heard)) = own else { return Vec::new() };
+        let hear = |(sector, &heard): (usize, &Heard)| {
+            let emitter = heard.robot as usize;
+            if emitter == self.silent.len() {
+                let message = vec![0.0; self.ether.message_len()];
+                let frame = Frame::new(FrameOrigin::NOTHING, &message);
+                return HeardFrame { frame, facing: [0.0; 2], signal: 0.0 };
+            }
+            let facing = self.facing(listeners, heard, neighbours, headings);
+            let log_strength = listeners.log_strength(robot, sector, heard, neighbours, headings);
+            HeardFrame {
+                frame: self.sent(emitter),
+                facing: [facing.x, facing.y],
+                signal: libm::exp(log_strength),
+            }
+        };
+        heard.iter().enumerate().map(hear).collect()
+    }
+
+    /// (cos, sin) of the emitter's sector that faces the listener; zero if it is not observed.
+    fn facing(
+        &self,
+        listeners: &Listeners,
+        heard: Heard,
+        neighbours: &Neighbours,
+        headings: &[f64],
+    ) -> Vec2 {
+        if listeners.receiver.observes_sending_direction {
+            self.hearing.sending_direction(listeners, heard, neighbours, headings)
+        } else {
+            Vec2::default()
+        }
+    }
+
+    /// The frame of a robot that is on the air.
+    pub fn sent(&self, robot: usize) -> Frame {
+        Frame::new(self.ether.origin(robot), self.ether.message(robot))
     }
 
     /// Puts the frames of a group of robots on the air.

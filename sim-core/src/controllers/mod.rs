@@ -4,7 +4,7 @@ mod braitenberg;
 mod neural;
 
 pub(crate) use braitenberg::BraitenbergLightFollower;
-pub(crate) use neural::NeuralController;
+pub(crate) use neural::{NeuralController, bounded};
 
 use crate::communication::Mode;
 use crate::lanes::Lanes;

@@ -38,11 +38,16 @@ impl<'a> NeuralController<'a> {
 /// Largest absolute value of a reward, so that no weight overflows.
 const MAX_REWARD: f64 = 1e6;
 
+/// The reward that a network gets.
+pub(crate) fn bounded(reward: f64) -> f32 {
+    // A script's fitness may be NaN.
+    let reward = if reward.is_nan() { 0.0 } else { reward.clamp(-MAX_REWARD, MAX_REWARD) };
+    reward as f32
+}
+
 impl Controller for NeuralController<'_> {
     fn reward(&mut self, lane: usize, reward: f64) {
-        // A script's fitness may be NaN.
-        let reward = if reward.is_nan() { 0.0 } else { reward.clamp(-MAX_REWARD, MAX_REWARD) };
-        self.state.reward(lane, reward as f32);
+        self.state.reward(lane, bounded(reward));
     }
 
     fn perceive(&mut self, stimuli: &Lanes) {

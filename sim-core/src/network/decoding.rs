@@ -28,7 +28,7 @@ pub(crate) struct Output {
 
 /// A decoder of activities or spikes to an action.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Decoder {
+pub enum Decoder {
     /// The activity itself.
     Identity,
     /// 1 if the activity is at least one half, else 0.
@@ -86,6 +86,17 @@ pub(super) fn compile(
 }
 
 impl Output {
+    /// Number of uniform numbers that the decoder draws in a step.
+    pub fn n_draws(&self, message_len: usize) -> usize {
+        match (self.decoder, self.actuator) {
+            (Decoder::Softmax, ActuatorQuery::Led | ActuatorQuery::Mode) => 1,
+            (Decoder::Bernoulli, ActuatorQuery::Message) => self.neurons.len().min(message_len),
+            (Decoder::Bernoulli, ActuatorQuery::Wheels) => self.neurons.len().min(2),
+            (Decoder::Bernoulli, ActuatorQuery::Led | ActuatorQuery::Mode) => 1,
+            _ => 0,
+        }
+    }
+
     /// Decodes the neurons of one lane. `weights`: the weights of the decoder, value by value.
     pub fn decode(
         &self,

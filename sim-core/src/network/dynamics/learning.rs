@@ -10,6 +10,7 @@
 use pulp::Simd;
 
 use super::aligned::Aligned;
+use crate::blueprint::{PlasticSynapse, Plasticity};
 use crate::lanes::Lanes;
 use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
@@ -19,22 +20,12 @@ use crate::network::{Network, Phenotype};
 pub(super) struct Rule {
     /// All weights at the start, by number of the synapse.
     weights: Vec<f32>,
-    plastic: Vec<Plastic>,
+    plastic: Vec<PlasticSynapse>,
     max_weight: f32,
     /// Factors of the rewards, beginning at the step of the activities; `None` without reward.
     discounts: Option<Vec<f32>>,
     /// Number of rows with an activity: neurons, nodes of encoders, inputs.
     n_rows: usize,
-}
-
-/// A plastic synapse.
-#[derive(Debug)]
-struct Plastic {
-    synapse: usize,
-    pre: usize,
-    post: usize,
-    /// A, B, C and D, each times the learning rate.
-    coefficients: [f32; 4],
 }
 
 /// The weights in some neighbouring vectors of lanes, and the past activities and rewards that
@@ -68,7 +59,7 @@ impl Rule {
             let synapses = group.synapses.clone().filter(|_| group.is_plastic);
             plastic.extend(synapses.map(|synapse| {
                 let ends = network.synapses[synapse];
-                Plastic { synapse, pre: row(ends.pre), post: ends.post, coefficients }
+                PlasticSynapse { synapse, pre: row(ends.pre), post: ends.post, coefficients }
             }));
         }
         let discounts = config.reward.map(|reward| {
@@ -82,6 +73,12 @@ impl Rule {
             discounts,
             n_rows: n_sources + n_inputs,
         })
+    }
+
+    /// The rule as numbers.
+    pub fn blueprint(self) -> Plasticity {
+        let Self { weights, plastic: synapses, max_weight, discounts, .. } = self;
+        Plasticity { weights, synapses, max_weight, discounts }
     }
 
     /// Number of environment steps whose activities are stored.
@@ -119,7 +116,7 @@ impl Rule {
         let weights: &mut [[S::f32s; W]] =
             S::as_mut_simd_f32s(memory.weights.values_mut()).0.as_chunks_mut().0;
         let (max, min) = (simd.splat_f32s(self.max_weight), simd.splat_f32s(-self.max_weight));
-        for &Plastic { synapse, pre, post, coefficients } in &self.plastic {
+        for &PlasticSynapse { synapse, pre, post, coefficients } in &self.plastic {
             let [a, b, c, d] = coefficients;
             for vector in 0..W {
                 let (x_j, x_i) = (activities[pre][vector], activities[post][vector]);

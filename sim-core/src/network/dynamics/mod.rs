@@ -14,11 +14,13 @@ use indexmap::IndexMap;
 
 use super::connections::{Synapse, SynapseGroup};
 use super::{Ensemble, Network, Phenotype};
+use crate::blueprint::{Neurons, Plasticity};
 use crate::lanes::Lanes;
 use ctrnn::{Ctrnn, PlasticCtrnn};
 use determinism::Isa;
 use determinism::random::Stream;
 use experiment_file::NeuronModel;
+use learning::Rule;
 
 /// The neurons of a network with their synapses, by one model, and their state in every lane. An
 /// implementation must give a lane the same bits for any place, any neighbouring lanes and any
@@ -191,4 +193,18 @@ fn compile(
         Wiring::Rate(wiring) => Box::new(Ctrnn::new(isa, network, wiring, phenotype, n_lanes)),
         Wiring::Spiking(wiring) => spiking::compile(isa, network, wiring, phenotype, n_lanes),
     }
+}
+
+/// The neurons of a genotype as numbers, and the plasticity of their weights.
+pub(crate) fn blueprint(network: &Network, phenotype: &Phenotype) -> (Neurons, Option<Plasticity>) {
+    let neurons = match network.wiring() {
+        Wiring::Rate(_) if network.learning.is_some() => {
+            Neurons::Rate(ctrnn::plastic_blueprint(network, phenotype))
+        }
+        Wiring::Rate(wiring) => Neurons::Rate(ctrnn::blueprint(network, wiring, phenotype)),
+        Wiring::Spiking(wiring) => {
+            Neurons::Spiking(Box::new(spiking::blueprint(network, wiring, phenotype)))
+        }
+    };
+    (neurons, Rule::compile(network, phenotype).map(Rule::blueprint))
 }

@@ -20,6 +20,7 @@
 //! network's structure. [`plastic`] computes networks whose weights change while robots live; in
 //! these networks, every lane has its own weights.
 
+mod blueprint;
 mod chunk;
 mod kernel;
 mod plastic;
@@ -30,10 +31,11 @@ mod wiring;
 use super::{Dynamics, Inputs};
 use crate::lanes::Lanes;
 use crate::network::{Network, Phenotype};
+pub(super) use blueprint::blueprint;
 use chunk::Chunk;
 use determinism::Isa;
 use kernel::Kernel;
-pub(super) use plastic::PlasticCtrnn;
+pub(super) use plastic::{PlasticCtrnn, blueprint as plastic_blueprint};
 use remainder::{Bundles, Remainder};
 pub(super) use wiring::Wiring;
 

@@ -12,6 +12,7 @@ use super::super::aligned::Aligned;
 use super::super::learning::{Memory, Rule};
 use super::super::{Dynamics, Inputs};
 use super::squash::{scale, squash};
+use crate::blueprint::{Link, RateNeurons, RateRow};
 use crate::lanes::Lanes;
 use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
@@ -121,6 +122,30 @@ impl Kernel {
         }
         let rule = Rule::compile(network, phenotype).expect("the network learns");
         Self { n_substeps: network.n_substeps, neurons, rule }
+    }
+}
+
+/// The neurons as numbers; their weights are those at the start.
+pub(in super::super) fn blueprint(network: &Network, phenotype: &Phenotype) -> RateNeurons {
+    let kernel = Kernel::compile(network, phenotype);
+    let links = |synapses: &[(usize, usize)]| {
+        let weight = |number: usize| phenotype.weights[number] as f32;
+        let link = |&(other, synapse)| Link { other, weight: weight(synapse), synapse };
+        synapses.iter().map(link).collect()
+    };
+    let rows = kernel.neurons.iter().map(|neuron| RateRow {
+        activation: neuron.activation,
+        start: neuron.start,
+        retention: neuron.retention,
+        drive: neuron.drive,
+        scale: neuron.scale,
+        afferent: links(&neuron.afferent),
+        recurrent: links(&neuron.recurrent),
+    });
+    RateNeurons {
+        rows_of: (0..kernel.neurons.len()).collect(),
+        rows: rows.collect(),
+        start_active: network.initial_rates == InitialRates::Activation,
     }
 }
 

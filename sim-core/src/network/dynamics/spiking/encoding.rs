@@ -15,6 +15,7 @@ use super::super::aligned::Aligned;
 use super::functions::exp;
 use super::lif::Lif;
 use super::model::Model;
+use crate::blueprint::{self, Field};
 use crate::lanes::Lanes;
 use crate::network::{Encoder as Structure, Network, Phenotype};
 use experiment_file::{
@@ -48,22 +49,6 @@ struct Encoder {
     field: Field,
 }
 
-/// A receptive field, which turns values of a stimulus into values of nodes.
-#[derive(Debug)]
-enum Field {
-    Identity,
-    Radial {
-        shape: RadialShape,
-        steepness: f32,
-        centres: Vec<f32>,
-        /// The value is x * scale + offset.
-        scale: f32,
-        offset: f32,
-    },
-    /// Weights, node by node.
-    Linear(Vec<f32>),
-}
-
 /// The state of the nodes of a chunk.
 #[derive(Debug)]
 pub(super) struct EncoderState {
@@ -82,7 +67,7 @@ impl Encoders {
             if scheme == EncodingScheme::PoissonRate {
                 n_drawing += nodes.len();
             }
-            let field = Field::compile(&config.receptive_field, weights);
+            let field = field(&config.receptive_field, weights);
             Encoder { scheme, inputs, nodes, first_draw, field }
         });
         let encoders = encoders.collect();
@@ -102,6 +87,33 @@ impl Encoders {
     #[inline(always)]
     pub fn n_nodes(&self) -> usize {
         self.n_nodes
+    }
+
+    /// Smallest and largest value of a node; `None` without limits.
+    #[inline(always)]
+    fn limits(&self, scheme: EncodingScheme) -> Option<[f32; 2]> {
+        match scheme {
+            EncodingScheme::Lif => None,
+            EncodingScheme::PoissonRate => Some([0.0, *limits::POISSON_RATE.end() as f32]),
+            EncodingScheme::RankOrder => Some([1.0, self.n_substeps as f32]),
+        }
+    }
+
+    /// The constants of the nodes' LIF neurons.
+    pub fn lif(&self) -> [f32; 5] {
+        self.lif
+    }
+
+    /// The encoders as numbers.
+    pub fn blueprint(&self) -> Vec<blueprint::Encoder> {
+        let encoders = self.encoders.iter().map(|encoder| blueprint::Encoder {
+            scheme: encoder.scheme,
+            inputs: encoder.inputs.clone(),
+            nodes: encoder.nodes.clone(),
+            field: encoder.field.clone(),
+            limits: self.limits(encoder.scheme),
+        });
+        encoders.collect()
     }
 
     /// The values of all nodes in an environment step, from its stimuli, `[input][lane]`.
@@ -147,11 +159,7 @@ impl Encoders {
                     }
                 }
             }
-            let [low, high] = match scheme {
-                EncodingScheme::Lif => continue,
-                EncodingScheme::PoissonRate => [0.0, *limits::POISSON_RATE.end() as f32],
-                EncodingScheme::RankOrder => [1.0, self.n_substeps as f32],
-            };
+            let Some([low, high]) = self.limits(*scheme) else { continue };
             let (low, high) = (simd.splat_f32s(low), simd.splat_f32s(high));
             for value in values.iter_mut().flatten() {
                 *value = simd.max_f32s(simd.min_f32s(*value, high), low);
@@ -233,25 +241,24 @@ fn respond<S: Simd>(simd: S, shape: RadialShape, steepness: S::f32s, d: S::f32s)
     }
 }
 
-impl Field {
-    fn compile(config: &ReceptiveField, weights: &[f64]) -> Self {
-        let Some(field) = config.radial() else {
-            return match config {
-                ReceptiveField::Linear(_) => {
-                    Self::Linear(weights.iter().map(|&weight| weight as f32).collect())
-                }
-                _ => Self::Identity,
-            };
+/// A receptive field with its weights.
+fn field(config: &ReceptiveField, weights: &[f64]) -> Field {
+    let Some(field) = config.radial() else {
+        return match config {
+            ReceptiveField::Linear(_) => {
+                Field::Linear(weights.iter().map(|&weight| weight as f32).collect())
+            }
+            _ => Field::Identity,
         };
-        let RadialField { shape, steepness, values: [min, max], inverted, .. } = field;
-        let (scale, offset) = if inverted { (min - max, max) } else { (max - min, min) };
-        Self::Radial {
-            shape,
-            steepness: steepness as f32,
-            centres: (0..field.n_neurons).map(|node| field.centre(node) as f32).collect(),
-            scale: scale as f32,
-            offset: offset as f32,
-        }
+    };
+    let RadialField { shape, steepness, values: [min, max], inverted, .. } = field;
+    let (scale, offset) = if inverted { (min - max, max) } else { (max - min, min) };
+    Field::Radial {
+        shape,
+        steepness: steepness as f32,
+        centres: (0..field.n_neurons).map(|node| field.centre(node) as f32).collect(),
+        scale: scale as f32,
+        offset: offset as f32,
     }
 }
 
@@ -341,7 +348,7 @@ mod tests {
                 inputs: 0..stimuli.len(),
                 nodes: 0..n_nodes,
                 first_draw: 0,
-                field: Field::compile(&field, weights),
+                field: super::field(&field, weights),
             }],
             n_nodes,
             n_drawing: if is_drawing { n_nodes } else { 0 },

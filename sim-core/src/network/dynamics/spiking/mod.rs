@@ -8,6 +8,7 @@
 //! that spike in no lane of a chunk: they would add zero, which changes no sum.
 
 mod adex;
+mod blueprint;
 mod chunk;
 mod circuit;
 mod encoding;
@@ -24,6 +25,7 @@ mod wiring;
 use super::{Dynamics, Inputs, SpikeWindow};
 use crate::lanes::Lanes;
 use crate::network::{Network, Phenotype};
+pub(super) use blueprint::blueprint;
 use chunk::Chunk;
 use circuit::Circuit;
 use determinism::Isa;

@@ -12,9 +12,11 @@
 use pulp::Simd;
 
 use super::super::aligned::Aligned;
+use super::blueprint::links;
 use super::circuit::{Weighted, weight};
 use super::functions::exp;
 use super::wiring::Wiring;
+use crate::blueprint;
 use crate::network::Phenotype;
 use experiment_file::{SynapseParams, limits};
 
@@ -156,6 +158,15 @@ impl Receptors {
                 }
             }
         }
+    }
+}
+
+impl Receptors {
+    /// The synapses as numbers, for postsynaptic neurons up to `n_neurons`.
+    pub fn blueprint(self, n_neurons: usize) -> blueprint::Receptors {
+        let Self { delays, incoming, drives, retention, rise, decay, magnesium } = self;
+        let incoming = incoming.map(|synapses| links(&synapses, n_neurons));
+        blueprint::Receptors { delays, incoming, drives, retention, rise, decay, magnesium }
     }
 }
 
