@@ -38,7 +38,12 @@ const GROUPS: [Group; 8] = [
         &["bench"],
     ),
     group("Control", &[], Control::augment_subcommands, &[]),
-    group("Keep and share", &[], Keep::augment_subcommands, &["verify", "backup", "doctor"]),
+    group(
+        "Keep and share",
+        &[],
+        Keep::augment_subcommands,
+        &["export-controller", "verify", "backup", "doctor"],
+    ),
     group("Fleet", &[], Fleet::augment_subcommands, &[]),
     group("Experiment files", &["examples", "new", "validate", "schema"], no_family, &[]),
     group("Tools", &["completions", "man", "help"], no_family, &[]),

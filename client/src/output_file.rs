@@ -208,8 +208,8 @@ impl OutputFiles {
     }
 
     /// Writes one file.
-    pub fn write(&self, name: &str, text: &str) -> Result<(), Error> {
-        fs::write(self.unfinished().join(name), text)
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<(), Error> {
+        fs::write(self.unfinished().join(name), content)
             .map_err(|error| unwritable(&self.to.join(name), &error))
     }
 

@@ -267,6 +267,7 @@ fn pages_show_what_their_commands_print() {
         "docs/howto/compare.md",
         "docs/howto/publish.md",
         "docs/data.md",
+        "docs/robots.md",
         "docs/tasks.md",
     ]);
 }

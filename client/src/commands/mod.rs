@@ -13,6 +13,7 @@ mod evaluate;
 mod examples;
 mod explain;
 mod export;
+mod export_controller;
 pub mod fleet;
 mod fork;
 mod history;
@@ -67,6 +68,7 @@ pub enum Command {
     Replay(replay::ReplayArgs),
     Web(web::WebArgs),
     Evaluate(evaluate::EvaluateArgs),
+    ExportController(export_controller::ExportControllerArgs),
     Verify(verify::VerifyArgs),
     Plot(plot::PlotArgs),
     Compare(compare::CompareArgs),
@@ -127,6 +129,9 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
             return simulate::simulate(settings, &args, &mut progress).await;
         }
         Command::Replay(args) => return replay::replay(settings, &args, &mut progress).await,
+        Command::ExportController(args) => {
+            return export_controller::export_controller(settings, &args, &mut progress).await;
+        }
         Command::Verify(args) => return verify::verify(settings, &args, &mut progress).await,
         Command::Plot(args) => return plot::plot(settings, &args, &mut progress).await,
         Command::Compare(args) => return compare::compare(settings, &args, &mut progress).await,

@@ -57,6 +57,8 @@ const ASKED: &[&str] = &[
     "simulate 1 --trials 2 --steps 9",
     "simulate 3",
     "simulate 9@1/3",
+    "export-controller 9 --to TO.c",
+    "export-controller 1@1/3 --to TO.c",
     "replay 9 --to TO.html",
     "replay 3 --to TO.html",
     "replay 1@1/3 --to TO.png --at 3",
