@@ -1,6 +1,8 @@
 //! Compiles controllers with the C compiler of this machine, and compares every bit with recorded
 //! episodes.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
