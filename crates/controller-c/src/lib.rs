@@ -1,12 +1,13 @@
 //! Controllers as C99 that computes the bits of the simulation.
 //!
-//! [`export`] writes the files of a controller: the network of one robot and its radio, without heap,
-//! globals, and functions of libm other than `fmaf`; and recorded episodes (`vectors`), with which
-//! the test among these files compares every bit.
+//! [`export`] writes the files of a controller: the network of one robot and its radio, without
+//! heap, globals, and functions of libm other than `fmaf`; and recorded episodes (`vectors`), with
+//! which the test among these files compares every bit.
 //!
-//! `rate` and `spiking` write the neurons, `plastic` their learning, `encoding` the encoders, `decoding` the decisions, `radio` the radio, `interface`
-//! the header, `trial` the test; the folder `c` has the functions that do not depend on the
-//! network. `names` and `literals` turn names and numbers into text of C.
+//! `rate` and `spiking` write the neurons, `plastic` their learning, `encoding` the encoders,
+//! `decoding` the decisions, `radio` the radio, `interface` the header, `trial` the test; the folder
+//! `c` has the functions that do not depend on the network. `names` and `literals` turn names and
+//! numbers into text of C.
 
 mod controller;
 mod decoding;
