@@ -2,10 +2,15 @@
 
 use std::sync::Arc;
 
+use controller_c::About;
 use evolution::{ALGORITHMS, Digest};
 use experiment_file::{ExperimentConfig, ScriptConfig};
 use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
+use pyo3::{
+    exceptions::PyValueError,
+    prelude::*,
+    types::{PyBytes, PyDict},
+};
 use sim_core::{FINGERPRINT, Simulation};
 use swarm_web::{Episode, Replay, replay_file};
 
@@ -147,6 +152,29 @@ impl Experiment {
     fn network_json(&self, genotype: PyReadonlyArray1<'_, f64>) -> PyResult<String> {
         let network = self.simulation.network_json(&genotype.to_vec()?);
         network.map(|network| network.to_string()).map_err(|error| evaluate_error(&error))
+    }
+
+    /// The files of the controller of a genotype in C, with the episodes of the trials: names and
+    /// contents.
+    fn controller_c<'py>(
+        &self,
+        py: Python<'py>,
+        genotype: PyReadonlyArray1<'py, f64>,
+        trials: Trials,
+    ) -> PyResult<Vec<(&'static str, Bound<'py, PyBytes>)>> {
+        let (genotype, trial_set) = (genotype.to_vec()?, trials.set()?);
+        let about = About {
+            experiment: self.config.name.clone(),
+            genotype: "a genotype of Python".into(),
+            config_digest: self.config_digest(),
+        };
+        let simulation = &self.simulation;
+        let export =
+            || controller_c::export(simulation, &genotype, trial_set, trials.range(), &about);
+        let controller = guarded(py, export)?;
+        let controller = controller.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let files = controller.files.iter();
+        Ok(files.map(|(name, content)| (*name, PyBytes::new(py, content))).collect())
     }
 
     /// The player with an episode, as an HTML file.

@@ -249,7 +249,15 @@ class Experiment:
 
     def network(self, genotype: Genes) -> Network:
         """The network that a genotype ``[d]`` encodes."""
-        return Network(json.loads(self._core.network_json(self._genotype(genotype))))
+        genes = self._genotype(genotype)
+        network = Network(json.loads(self._core.network_json(genes)))
+        network._origin = (self, genes)
+        return network
+
+    def _controller_c(
+        self, genes: Floats, generation: AnyTrialSet, trials: int | range | None
+    ) -> list[tuple[str, bytes]]:
+        return self._core.controller_c(genes, address(generation, trials, self.n_trials))
 
     def replace(
         self,

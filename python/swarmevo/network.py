@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .extras import needs
+from .trials import AnyTrialSet
 
 if TYPE_CHECKING:
     import networkx
+
+    from .experiment import Experiment
 
 
 class Network:
@@ -61,6 +66,28 @@ class Network:
                 self.node_weights[synapse["post"], pre["node"]] += synapse["weight"]
             else:
                 self.weights[synapse["post"], pre["neuron"]] += synapse["weight"]
+
+    _origin: tuple[Experiment, NDArray[np.float64]] | None = None
+
+    def to_c(
+        self,
+        directory: str | os.PathLike[str],
+        generation: AnyTrialSet = 0,
+        *,
+        trials: int | range | None = 1,
+    ) -> list[Path]:
+        """Writes the controller with its radio as C99, with T recorded trials: ``make test`` in the
+        directory compares every bit with them. Replaces existing files, and returns all paths. As
+        ``swarmctl export-controller``, for networks of :meth:`Experiment.network`."""
+        if self._origin is None:
+            raise ValueError("this network is only a description; to_c needs one of experiment.network(genotype)")
+        experiment, genes = self._origin
+        files = experiment._controller_c(genes, generation, trials)
+        directory = Path(directory)
+        directory.mkdir(parents=True, exist_ok=True)
+        for name, content in files:
+            (directory / name).write_bytes(content)
+        return [directory / name for name, _ in files]
 
     def to_networkx(self) -> networkx.MultiDiGraph:
         """A graph with a node per input, node of an encoder and neuron, under their names, and an

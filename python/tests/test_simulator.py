@@ -2,6 +2,7 @@
 
 import pickle
 import signal
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -134,6 +135,17 @@ def test_mirror_equals_the_reflection_of_the_algorithms():
     expected = [0.0, 0.25, 1.0, 0.75, 0.25, 0.25, 0.75, 0.75]
     assert swarmevo.mirror(x).tolist() == expected
     assert np.all((swarmevo.mirror([1e300, -1e300]) >= 0) & (swarmevo.mirror([1e300]) <= 1))
+
+
+def test_a_network_becomes_c_that_computes_the_same_bits(quickstart, genotypes, tmp_path):
+    network = quickstart.network(genotypes[0])
+    files = network.to_c(tmp_path / "robot", 3, trials=2)
+    assert {"controller.c", "swarm_radio.c", "README.md"} < {it.name for it in files}
+    made = subprocess.run(["make", "-s", "test"], cwd=tmp_path / "robot", capture_output=True, text=True)
+    steps = 2 * 5 * quickstart.n_steps
+    assert made.stdout == f"{steps} robot-steps, 0 bits differ\n", made
+    with pytest.raises(ValueError, match="only a description"):
+        swarmevo.Network(network.description).to_c(tmp_path)
 
 
 def test_a_network_has_the_weights_that_its_genes_encode(quickstart):
