@@ -121,3 +121,53 @@ impl Simulation {
         episode::testify(self, &phenotype, trial_set.into(), trial, observe)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Mode;
+    use crate::record::StepRecord;
+    use crate::testing::{experiment_a, experiment_a_spiking, experiment_d, genotype};
+    use experiment_file::NeuronModel;
+
+    /// Robots testify to the episode that `simulate` shows; their decisions are those of the
+    /// network, which perturbations and the first steps overrule.
+    #[test]
+    fn testimonies_are_of_the_same_episode() {
+        let mut n_overruled = 0;
+        for config in [experiment_a(), experiment_a_spiking(NeuronModel::Lif), experiment_d()] {
+            let simulation = Simulation::compile(&config).unwrap();
+            let genotype = genotype(simulation.genotype_len(), 3);
+            let mut records: Vec<StepRecord> = Vec::new();
+            simulation.simulate(&genotype, 4, 1, &mut |step| records.push(step.clone())).unwrap();
+            let mut n_testimonies = 0;
+            let mut check = |testimony: &Testimony| {
+                n_testimonies += 1;
+                let robot = &records[testimony.step as usize].robots[testimony.robot];
+                let as_f64 = |values: &[f32]| -> Vec<f64> {
+                    values.iter().map(|&value| value.into()).collect()
+                };
+                assert_eq!(as_f64(&testimony.stimuli), robot.stimuli);
+                assert_eq!(as_f64(&testimony.activity), robot.activity);
+                assert_eq!(as_f64(&testimony.voltages), robot.voltages);
+                assert_eq!(testimony.wheels, robot.wheels);
+                let radio = &testimony.radio;
+                assert_eq!(radio.sends, robot.mode == Mode::Send);
+                assert_eq!(radio.sector, robot.received.map(|frame| frame.sector));
+                if let (Some(sector), Some(received)) = (radio.sector, robot.received) {
+                    let heard = &radio.heard[sector];
+                    assert_eq!(heard.frame.originator as usize, received.originator);
+                    assert_eq!(heard.frame.message, robot.received_message);
+                    assert_eq!(heard.signal, received.signal);
+                }
+                let sent = radio.sent.as_ref().unwrap();
+                let message = if radio.sends { &robot.message } else { &robot.received_message };
+                assert_eq!(&sent.message, message);
+                n_overruled += u32::from(radio.sends != testimony.sends);
+            };
+            simulation.testify(&genotype, 4, 1, &mut check).unwrap();
+            assert_eq!(n_testimonies, records.len() * simulation.witnesses().len());
+        }
+        assert!(n_overruled > 0, "the first steps overrule no decision");
+    }
+}
