@@ -29,6 +29,8 @@ pub struct Recording {
     measures: Vec<f64>,
     lights: Vec<f64>,
     areas: Vec<f64>,
+    movables: Vec<f64>,
+    touches: Vec<bool>,
     fitness: Vec<f64>,
     /// Maximum number of stimuli, neurons and voltages of a robot.
     widths: [usize; 3],
@@ -48,6 +50,8 @@ impl Recording {
         }
         self.step_fitness.push(step.fitness.unwrap_or(f64::NAN));
         self.lights.extend(step.lights.iter().flat_map(|light| [light.x, light.y]));
+        let movables = step.movables.iter();
+        self.movables.extend(movables.flat_map(|it| [it.position.x, it.position.y, it.heading]));
     }
 
     /// Makes room for all steps.
@@ -65,6 +69,8 @@ impl Recording {
         self.frame_sectors.reserve_exact(n);
         self.frame_signals.reserve_exact(n);
         self.targets.reserve_exact(n);
+        self.touches.reserve_exact(n);
+        self.movables.reserve_exact(3 * n_steps * step.movables.len());
         let message_len = step.robots.iter().map(|robot| robot.message.len()).max().unwrap_or(0);
         self.messages.reserve_exact(n * message_len);
         self.frame_messages.reserve_exact(n * message_len);
@@ -93,6 +99,7 @@ impl Recording {
         self.frame_signals.push(frame.map_or(0.0, |frame| frame.signal));
         self.frame_messages.extend(&robot.received_message);
         self.targets.push(robot.target.map_or(-1, i8::from));
+        self.touches.push(robot.touches);
         // The simulator computes them with 32 bits.
         let [n_stimuli, n_neurons, n_voltages] = self.widths;
         pad(&mut self.stimuli, &robot.stimuli, n_stimuli);
@@ -137,6 +144,7 @@ impl Recording {
         arrays.one_per_robot("frame_sectors", all.frame_sectors)?;
         arrays.one_per_robot("frame_signals", all.frame_signals)?;
         arrays.one_per_robot("targets", all.targets)?;
+        arrays.one_per_robot("touches", all.touches)?;
         let (trials, steps) = (arrays.n_trials, arrays.n_steps);
         arrays.set("step_fitness", all.step_fitness, [trials, steps])?;
         let n_measures = all.measures.len() / (trials * steps).max(1);
@@ -146,6 +154,8 @@ impl Recording {
         arrays.set("lights", all.lights, [trials, steps, n_lights, 2])?;
         let n_areas = all.areas.len() / (2 * trials).max(1);
         arrays.set("areas", all.areas, [trials, n_areas, 2])?;
+        let n_movables = all.movables.len() / (3 * trials * steps).max(1);
+        arrays.set("movables", all.movables, [trials, steps, n_movables, 3])?;
         Ok(arrays.dict)
     }
 
@@ -171,6 +181,8 @@ impl Recording {
         join(&mut self.measures, other.measures);
         join(&mut self.lights, other.lights);
         join(&mut self.areas, other.areas);
+        join(&mut self.movables, other.movables);
+        join(&mut self.touches, other.touches);
         join(&mut self.fitness, other.fitness);
     }
 }

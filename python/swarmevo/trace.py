@@ -75,6 +75,10 @@ class Trace:
     """``[T, steps, L, 2]``: positions of lights during the step, cm."""
     areas: Floats
     """``[T, A, 2]``: positions of ground areas at the start, cm."""
+    movables: Floats
+    """``[T, steps, B, 3]``: x and y, cm, and heading of movables at the end of the step."""
+    touches: Bools
+    """``[T, steps, R]``: whether its body touches something."""
 
     def __init__(
         self,
@@ -174,6 +178,12 @@ class Trace:
         for i in range(self.lights.shape[2]):
             columns[f"light_{i}_x_cm"] = of_step(self.lights[:, :, i, 0])
             columns[f"light_{i}_y_cm"] = of_step(self.lights[:, :, i, 1])
+        for i in range(self.movables.shape[2]):
+            columns[f"movable_{i}_x_cm"] = of_step(self.movables[:, :, i, 0])
+            columns[f"movable_{i}_y_cm"] = of_step(self.movables[:, :, i, 1])
+            columns[f"movable_{i}_heading_rad"] = of_step(self.movables[:, :, i, 2])
+        if self.experiment.to_dict()["world"].get("bodies") is not None:
+            columns["touches"] = flat(self.touches)
         columns["step_fitness"] = of_step(self.step_fitness)
         for name, measure in self.measures.items():
             columns[f"metric_{name}"] = of_step(measure)

@@ -6,11 +6,21 @@ import subprocess
 
 import numpy as np
 import pytest
+import swarmevo
+
+from conftest import PROJECT
 
 
 @pytest.fixture(scope="module")
 def trace(quickstart, genotypes):
     return quickstart.simulate(genotypes[0], 1)
+
+
+@pytest.fixture(scope="module")
+def transport():
+    """Four robots with bodies, and a box."""
+    file = PROJECT / "configs/tasks/transport.json"
+    return swarmevo.Experiment.from_file(file).replace(evaluation_steps=60, num_evaluations=2)
 
 
 def test_arrays_have_the_shapes_that_are_documented(trace):
@@ -63,11 +73,36 @@ def test_tables_have_a_row_per_trial_step_and_robot(trace):
     assert other["heading_rad"].to_list() == table["heading_rad"].tolist()
 
 
-def test_the_table_is_the_trace_of_swarmctl(quickstart, genotypes, programs, tmp_path):
+def test_movables_and_contacts_are_those_of_the_room(transport):
+    # All robots drive straight on: the wheels' biases are at their maximum, the weights at 0.
+    genotype = np.full(transport.n_genes, 0.5)
+    genotype[-2:] = 1
+    trace = transport.simulate(genotype, 1)
+    assert trace.movables.shape == (2, 60, 1, 3) and trace.touches.shape == (2, 60, 4)
+    assert trace.touches.dtype == bool
+    box, heading = trace.movables[:, :, 0, :2], trace.movables[:, :, 0, 2]
+    assert np.allclose(box[:, 0], [80, 100]) and ((0 <= heading) & (heading < 2 * np.pi)).all()
+    moved = np.linalg.norm(np.diff(box, axis=1), axis=-1) > 1e-6
+    assert moved.any(), "nobody pushes the box"
+    near = np.linalg.norm(trace.positions - box[:, :, np.newaxis], axis=-1) < 3.5 + 12 * 2**0.5 + 0.1
+    # Who pushes it, touches it.
+    assert (near & trace.touches).any(axis=-1)[:, 1:][moved].all()
+    assert not trace.touches.all()
+
+
+def test_points_touch_nothing_and_have_no_movables(trace):
+    assert trace.movables.shape == (3, 100, 0, 3) and not trace.touches.any()
+    assert "touches" not in trace.columns()
+
+
+@pytest.mark.parametrize("name", ["quickstart", "transport"])
+def test_the_table_is_the_trace_of_swarmctl(name, request, programs, tmp_path):
     """``to_pandas`` has the columns and the values of ``swarmctl simulate --trace``."""
+    experiment = request.getfixturevalue(name)
+    genes = np.random.default_rng(1).random(experiment.n_genes)
     file, genotype, out = (tmp_path / name for name in ("file.json", "genes.json", "trace.csv"))
-    file.write_text(quickstart.to_json())
-    genotype.write_text(json.dumps(genotypes[0].tolist()))
+    file.write_text(experiment.to_json())
+    genotype.write_text(json.dumps(genes.tolist()))
     subprocess.run(
         [programs / "swarmctl", "simulate", file, "--genotype", genotype, "--generation", "1",
          "--trace", out, "--trace-columns", "neurons,frames,targets"],
@@ -75,7 +110,7 @@ def test_the_table_is_the_trace_of_swarmctl(quickstart, genotypes, programs, tmp
     )
     with out.open() as lines:
         rows = list(csv.DictReader(lines))
-    columns = quickstart.simulate(genotypes[0], 1).columns()
+    columns = experiment.simulate(genes, 1).columns()
     assert len(rows) == len(columns["trial"])
     same = set(rows[0]) & set(columns)
     # In swarmctl's table, modes are words, and missing values are empty.
