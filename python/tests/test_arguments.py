@@ -2,6 +2,7 @@
 
 import inspect
 import re
+import tempfile
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ QUICK = swarmevo.Experiment.quickstart().replace(evaluation_steps=20)
 GENES = np.full(QUICK.n_genes, 0.5)
 TRACE = QUICK.simulate(GENES, trials=2)
 LIT = TRACE.leds[:, 10:] > 0
+FOLDER = tempfile.TemporaryDirectory()
 
 
 class Nobody:
@@ -67,6 +69,8 @@ CASES = {
         for name in ("evaluate", "measure", "simulate", "episodes")
         for key in ("generation", "trials", "threads") if (name, key) != ("episodes", "threads")
     },
+    "Network.to_c.generation": lambda it: QUICK.network(GENES).to_c(FOLDER.name, it),
+    "Network.to_c.trials": lambda it: QUICK.network(GENES).to_c(FOLDER.name, 0, trials=it),
     "TrialSet.generation": lambda it: QUICK.evaluate(GENES, swarmevo.TrialSet("generation", it)),
     "TrialSet.block": lambda it: QUICK.evaluate(GENES, swarmevo.TrialSet("held_out", 0, it)),
     "TrialSet.of.trials": swarmevo.TrialSet.of,

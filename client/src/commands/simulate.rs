@@ -39,9 +39,13 @@ pub async fn simulate(
     let refused = |error: EvaluateError| Error::Input(format!("{genotype}: {error}"));
     compiled.experiment.network_json(&genotype.genes).map_err(refused)?;
     let mut trace = match &args.trace {
-        Some(path) => {
-            Some(Trace::create(path, &compiled.config, &args.trace_columns, args.overwrite)?)
-        }
+        Some(path) => Some(Trace::create(
+            path,
+            &compiled.config,
+            &compiled.experiment,
+            &args.trace_columns,
+            args.overwrite,
+        )?),
         None => None,
     };
     let trials = waiting::busy(

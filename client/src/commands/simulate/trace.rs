@@ -8,7 +8,7 @@ use std::{
 use clap::ValueEnum;
 use experiment_file::{ExperimentConfig, RobotController};
 use indexmap::IndexSet;
-use sim_core::{Mode, ReceivedFrame, RobotRecord, StepRecord};
+use sim_core::{MeasureName, Mode, ReceivedFrame, RobotRecord, Simulation, StepRecord};
 
 use crate::{
     error::Error,
@@ -40,11 +40,12 @@ impl Trace {
     pub fn create(
         path: &Path,
         config: &ExperimentConfig,
+        simulation: &Simulation,
         extra: &[ExtraColumns],
         overwrite: Overwrite,
     ) -> Result<Self, Error> {
         let file = overwrite.begin(path)?;
-        let rows = Rows::new(BufWriter::new(file), config, extra);
+        let rows = Rows::new(BufWriter::new(file), config, simulation, extra);
         Ok(Self { path: path.into(), rows, result: Ok(()) })
     }
 
@@ -80,6 +81,8 @@ struct Rows<W> {
     has_frames: bool,
     has_targets: bool,
     has_bodies: bool,
+    /// Names of the measures, which some steps may lack.
+    measures: Vec<MeasureName>,
     n_rows: u64,
 }
 
@@ -91,7 +94,12 @@ struct Object {
 }
 
 impl<W: io::Write> Rows<W> {
-    fn new(out: W, config: &ExperimentConfig, extra: &[ExtraColumns]) -> Self {
+    fn new(
+        out: W,
+        config: &ExperimentConfig,
+        simulation: &Simulation,
+        extra: &[ExtraColumns],
+    ) -> Self {
         let (mut robots, mut objects, mut stimuli) = (Vec::new(), Vec::new(), IndexSet::new());
         for (name, robot) in config.robots() {
             let inputs: Vec<(&str, u32)> = match robot.controller {
@@ -125,6 +133,7 @@ impl<W: io::Write> Rows<W> {
             has_frames: wants(ExtraColumns::Frames),
             has_targets: wants(ExtraColumns::Targets),
             has_bodies: config.world.bodies.is_some(),
+            measures: simulation.measure_names().to_vec(),
             n_rows: 0,
         }
     }
@@ -155,7 +164,8 @@ impl<W: io::Write> Rows<W> {
                 row.push(u8::from(robot.touches).to_string());
             }
             row.push(record.fitness.map(number).unwrap_or_default());
-            row.extend(record.measures.values().copied().map(number));
+            let measure = |name| record.measures.get(name).copied().map(number).unwrap_or_default();
+            row.extend(self.measures.iter().map(measure));
             row.extend(self.extra_cells(robot));
             writeln!(self.out, "{}", row.join(","))?;
             self.n_rows += 1;
@@ -184,7 +194,7 @@ impl<W: io::Write> Rows<W> {
         cells
     }
 
-    /// The columns of messages, lights and measures are the same in all steps of an
+    /// The columns of messages, lights and movables are the same in all steps of an
     /// experiment.
     fn heading(&self, record: &StepRecord) -> Vec<String> {
         let place = ["trial", "step", "robot", "object", "x_cm", "y_cm", "heading_rad"];
@@ -204,7 +214,7 @@ impl<W: io::Write> Rows<W> {
             heading.push("touches".into());
         }
         heading.push("step_fitness".into());
-        heading.extend(record.measures.keys().map(|name| format!("metric_{name}")));
+        heading.extend(self.measures.iter().map(|name| format!("metric_{name}")));
         heading.extend(self.neurons.iter().map(|neuron| quoted(&format!("neuron_{neuron}"))));
         if self.has_voltages {
             let voltages = self.neurons.iter();

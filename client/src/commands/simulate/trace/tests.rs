@@ -22,7 +22,7 @@ fn config(objects: &str) -> ExperimentConfig {
 fn trace(config: &ExperimentConfig) -> (Vec<Vec<String>>, Vec<StepRecord>) {
     let experiment = Simulation::compile(config).unwrap();
     let genotype = vec![0.6; experiment.genotype_len()];
-    let (mut rows, mut records) = (Rows::new(Vec::new(), config, ALL), Vec::new());
+    let (mut rows, mut records) = (Rows::new(Vec::new(), config, &experiment, ALL), Vec::new());
     let mut observe = |record: &StepRecord| {
         rows.write(4, record).unwrap();
         records.push(record.clone());
@@ -99,6 +99,27 @@ fn robots_with_other_controllers_have_columns_of_their_own_and_lights_have_place
 }
 
 #[test]
+fn measures_that_begin_late_have_a_column_from_the_first_step() {
+    let mut text: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(quickstart()).unwrap()).unwrap();
+    let script = "def fitness(world):\n    return 1\n\ndef measures(world):\n    return \
+                  {\"late\": 1 if world.step == 2 else None, \"now\": world.step}\n";
+    text["task"] = serde_json::json!({"script": {"name": "late.star", "text": script}});
+    text["algorithm"].as_object_mut().unwrap().remove("fitness_function");
+    text["algorithm"]["evaluation_steps"] = 3.into();
+    let (config, _) =
+        ExperimentConfig::from_json(&text.to_string(), "", evolution::ALGORITHMS).unwrap();
+    let (rows, _) = trace(&config);
+    let column = |name: &str| rows[0].iter().position(|cell| cell == name).unwrap();
+    for row in &rows[1..] {
+        assert_eq!(row.len(), rows[0].len());
+        let step: f64 = row[column("step")].parse().unwrap();
+        assert_eq!(row[column("metric_late")], if step == 2.0 { "1.0" } else { "" });
+        assert_eq!(row[column("metric_now")], format!("{step:?}"));
+    }
+}
+
+#[test]
 fn names_cannot_break_rows() {
     assert_eq!(quoted("robot"), "robot");
     assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
@@ -109,8 +130,9 @@ fn a_failure_is_reported_at_the_end() {
     let full = Path::new("/dev/full");
     if full.exists() {
         let config = config("");
-        let mut trace = Trace::create(full, &config, &[], Overwrite::default()).unwrap();
         let experiment = Simulation::compile(&config).unwrap();
+        let mut trace =
+            Trace::create(full, &config, &experiment, &[], Overwrite::default()).unwrap();
         let genotype = vec![0.5; experiment.genotype_len()];
         experiment.simulate(&genotype, 0, 0, &mut |record| trace.record(0, record)).unwrap();
         assert!(trace.finish().unwrap_err().to_string().starts_with("cannot write /dev/full: "));
