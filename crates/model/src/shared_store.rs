@@ -137,7 +137,9 @@ impl SharedStore {
         let store = Arc::clone(&self.store);
         task::spawn_blocking(move || {
             // A panic inside rolls its transaction back, so the store stays usable.
-            operation(&mut store.lock().unwrap_or_else(PoisonError::into_inner))
+            let mut store = store.lock().unwrap_or_else(PoisonError::into_inner);
+            store.keep_up();
+            operation(&mut store)
         })
         .await
         .expect("store operations do not panic")

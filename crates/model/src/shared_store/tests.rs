@@ -63,6 +63,21 @@ async fn assert_waits_out(name: &'static str, bad: u32, good: u32, expected: &st
 }
 
 #[tokio::test]
+async fn a_reader_sees_what_another_program_writes_later() {
+    let directory = tempfile::tempdir().unwrap();
+    drop(Store::open(directory.path()).unwrap());
+    let reader = SharedStore::new(Store::open_read_only(directory.path()).unwrap());
+    assert_eq!(n_experiments(&reader).await, 0);
+    for n_written in 1..4 {
+        let mut writer = Store::open(directory.path()).unwrap();
+        writer.create(&new_experiment(), 5).unwrap();
+        assert_eq!(n_experiments(&reader).await, n_written, "while it has the database");
+        drop(writer);
+        assert_eq!(n_experiments(&reader).await, n_written, "after it has ended");
+    }
+}
+
+#[tokio::test]
 async fn on_a_full_disk_a_write_waits_for_room() {
     assert_waits_out("max_page_count", 1, 1_000_000, "full").await;
 }

@@ -6,7 +6,7 @@ use std::{
     io::{self, Seek as _, SeekFrom, Write as _},
     path::{Path, PathBuf},
     thread,
-    time::Duration,
+    time::{Duration, SystemTime},
 };
 
 use rusqlite::{Connection, OpenFlags};
@@ -170,17 +170,37 @@ fn check(path: &Path) -> Result<()> {
     verdict.map_err(|error| error.at(path))
 }
 
+/// The file of a database that no program uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AtRest {
+    len: u64,
+    modified: SystemTime,
+}
+
+impl AtRest {
+    /// `None` if a program uses the database: then there is a log.
+    pub fn of(path: &Path) -> Option<Self> {
+        let metadata = fs::metadata(path).ok().filter(|_| !write_ahead_log::exists(path))?;
+        Some(Self { len: metadata.len(), modified: metadata.modified().ok()? })
+    }
+}
+
 /// Opens a database for reading, even while another program uses it, and leaves no files beside
 /// it.
 pub fn open_read_only(path: &Path) -> rusqlite::Result<Connection> {
+    open_read_only_as(path, AtRest::of(path))
+}
+
+/// As [`open_read_only`]. A connection to a database at rest reads that state of the file alone: it
+/// is of no use once [`AtRest::of`] gives something else.
+pub fn open_read_only_as(path: &Path, at_rest: Option<AtRest>) -> rusqlite::Result<Connection> {
     let mut flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let connection = if write_ahead_log::exists(path) {
-        Connection::open_with_flags(path, flags)?
-    } else {
-        // If there is no log, no program uses the database. `immutable` keeps SQLite from creating
-        // one.
+    let connection = if at_rest.is_some() {
+        // `immutable` keeps SQLite from creating a log.
         flags |= OpenFlags::SQLITE_OPEN_URI;
         Connection::open_with_flags(format!("{}?immutable=1", uri(path)), flags)?
+    } else {
+        Connection::open_with_flags(path, flags)?
     };
     connection.busy_timeout(BUSY_TIMEOUT)?;
     Ok(connection)

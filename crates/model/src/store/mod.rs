@@ -53,7 +53,7 @@ pub use records::{
 pub use summary::Summary;
 
 use error::Result;
-use file::Locks;
+use file::{AtRest, Locks};
 use seals::Sealer;
 
 /// The open database of one data directory.
@@ -66,6 +66,8 @@ pub struct Store {
     sealer: Sealer,
     /// `None` if the database is only read.
     ownership: Option<Ownership>,
+    /// The state of the file that the connection reads, if no program used the database.
+    at_rest: Option<AtRest>,
 }
 
 /// A coordinator's right to write.
@@ -111,7 +113,13 @@ impl Store {
         let path = file::path_in(directory);
         let (owner, sealer) =
             claim(&connection).map_err(|error| StoreError::from(error).at(&path))?;
-        Ok(Self { connection, path, sealer, ownership: Some(Ownership { owner, locks }) })
+        Ok(Self {
+            connection,
+            path,
+            sealer,
+            ownership: Some(Ownership { owner, locks }),
+            at_rest: None,
+        })
     }
 
     /// Opens the database in `directory` for reading, whether or not a coordinator uses it.
@@ -119,8 +127,9 @@ impl Store {
     pub fn open_read_only(directory: &Path) -> Result<Self> {
         must_be_in(directory)?;
         let path = file::path_in(directory);
+        let at_rest = AtRest::of(&path);
         let open = || {
-            let connection = file::open_read_only(&path)?;
+            let connection = file::open_read_only_as(&path, at_rest)?;
             let version = schema::version(&connection)?;
             if version > schema::VERSION {
                 return Err(StoreError::Newer { found: version, supported: schema::VERSION });
@@ -135,7 +144,18 @@ impl Store {
             Ok((connection, sealer))
         };
         let (connection, sealer) = open().map_err(|error| error.at(&path))?;
-        Ok(Self { connection, path, sealer, ownership: None })
+        Ok(Self { connection, path, sealer, ownership: None, at_rest })
+    }
+
+    /// Opens the database again if it was at rest and is no longer: the old connection would read
+    /// pages of both states, as if it was damaged. After a failure, the next call tries again.
+    pub fn keep_up(&mut self) {
+        if self.at_rest.is_none() || self.at_rest == AtRest::of(&self.path) {
+            return;
+        }
+        if let Some(Ok(store)) = self.path.parent().map(Self::open_read_only) {
+            *self = store;
+        }
     }
 
     /// Announces the address of this program to other programs that want the directory.
