@@ -1,26 +1,21 @@
 //! `swarmctl export-controller`: an evolved controller as C, with a proof.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use clap_complete::ArgValueCompleter;
 use controller_c::{About, Controller, NAMES};
 use evolution::Digest;
 use experiment_file::limits;
 use serde::Serialize;
 use sim_core::{FINGERPRINT, TrialSet};
 
-use super::simulate::genotype::Genotype;
+use super::subject::{Subject, SubjectArgs};
 use crate::{
-    address::NamedAddress,
-    args::{ChangedArg, FOREIGN, whole},
-    complete,
-    connection::Connection,
+    args::whole,
     error::Error,
-    experiment_file::{Compiled, ExperimentFile, Overrides},
+    experiment_file::{Compiled, Overrides},
     json,
     output_file::Overwrite,
-    place::Intent,
     progress::Progress,
     settings::Settings,
     waiting,
@@ -37,19 +32,8 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ExportControllerArgs {
-    /// The genotype: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation
-    /// G; ID@G/mean, the mean of the distribution after generation G.
-    #[arg(add = ArgValueCompleter::new(complete::experiments), required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
-    address: Option<NamedAddress>,
-    /// Experiment file of --genotype, instead of an address.
-    #[arg(long, value_name = "FILE", requires = "genotype")]
-    config: Option<PathBuf>,
-    /// File with the genotype: a JSON list of genes, or an object with a `genotype`,
-    /// such as a champion file; with --config.
-    #[arg(long, value_name = "FILE", group = FOREIGN, requires = "config")]
-    genotype: Option<PathBuf>,
     #[command(flatten)]
-    changed: ChangedArg,
+    subject: SubjectArgs,
     /// Language of the controller.
     #[arg(long, value_enum, default_value_t = Language::C)]
     language: Language,
@@ -100,16 +84,16 @@ pub async fn export_controller(
 ) -> Result<(), Error> {
     args.overwrite.check_files(&args.to, &NAMES)?;
     let Language::C = args.language;
-    let (file, genotype, generation) = subject(settings, args, progress).await?;
+    let Subject { file, genotype, generation, .. } = args.subject.find(settings, progress).await?;
     let Compiled { config, experiment: simulation, .. } =
         file.compile(&Overrides::default()).map_err(|error| file.invalid(&error))?;
     let about = About {
         experiment: config.name.clone(),
-        genotype: args.title(&genotype),
+        genotype: args.subject.title(&genotype),
         config_digest: Digest::of_config(&config, FINGERPRINT).to_string(),
     };
     let output = args.overwrite.begin_files(&args.to, &NAMES)?;
-    let trial_set = TrialSet::Generation(generation);
+    let trial_set = TrialSet::Generation(args.generation.unwrap_or(generation));
     let controller = waiting::busy("recording the episodes; --trials reduces their number", || {
         controller_c::export(&simulation, &genotype.genes, trial_set, 0..args.trials, &about)
     });
@@ -138,37 +122,4 @@ pub async fn export_controller(
             files.len()
         )
     })
-}
-
-impl ExportControllerArgs {
-    /// The source of the genotype, for readers of the files. Leaves out the directories of a path,
-    /// which only this machine has.
-    fn title(&self, genotype: &Genotype) -> String {
-        match self.genotype.as_deref().and_then(Path::file_name) {
-            Some(name) => format!("genotype in {}", name.display()),
-            None => genotype.to_string(),
-        }
-    }
-}
-
-/// The experiment, the genotype, and the generation of the worlds.
-async fn subject(
-    settings: Settings,
-    args: &ExportControllerArgs,
-    progress: &Progress,
-) -> Result<(ExperimentFile, Genotype, u64), Error> {
-    if let (Some(config), Some(genotype)) = (&args.config, &args.genotype) {
-        let file = ExperimentFile::read(config);
-        let file = file.map_err(|error| Error::invalid(config, &error))?;
-        let genotype = Genotype::read(genotype, &file, args.changed)?;
-        return Ok((file, genotype, args.generation.unwrap_or_default()));
-    }
-    let address = args.address.as_ref().expect("clap requires an address or a file");
-    let connection = Connection::open(settings, Intent::Read, progress).await?;
-    let address = connection.resolve(address).await?;
-    let found = connection.genotype(address).await?;
-    let name = format!("experiment {}", address.experiment);
-    let file = ExperimentFile::new(name.into(), found.config_json.clone());
-    let generation = args.generation.unwrap_or(found.individual.generation);
-    Ok((file, Genotype::found(address, found), generation))
 }

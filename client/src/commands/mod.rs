@@ -32,6 +32,7 @@ mod replay;
 mod run;
 mod schema;
 mod simulate;
+mod subject;
 pub mod submit;
 mod validate;
 mod verify;

@@ -5,24 +5,18 @@ mod picture;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
 use sim_core::{RoomRecord, StepRecord, TrialSet};
-use swarm_proto::v1::JudgedFitness;
 use swarm_web::{Episode, Replay, ReplayError, Trials, replay_file};
 
 use self::picture::PictureArgs;
-use super::simulate::genotype::Genotype;
+use super::subject::{Subject, SubjectArgs};
 use crate::{
-    address::NamedAddress,
-    args::{ChangedArg, FOREIGN, SeedArg, StepsArg, whole},
+    args::{SeedArg, StepsArg, whole},
     change::{Change, SetArg},
-    complete,
-    connection::Connection,
     error::Error,
-    experiment_file::{ExperimentFile, Overrides},
+    experiment_file::Overrides,
     output_file::Overwrite,
-    place::Intent,
     progress::Progress,
     settings::Settings,
     text, waiting,
@@ -37,19 +31,8 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ReplayArgs {
-    /// The genotype: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation
-    /// G; ID@G/mean, the mean of the distribution after generation G.
-    #[arg(add = ArgValueCompleter::new(complete::experiments), required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
-    address: Option<NamedAddress>,
-    /// Experiment file of --genotype, instead of an address.
-    #[arg(long, value_name = "FILE", requires = "genotype")]
-    config: Option<PathBuf>,
-    /// File with the genotype: a JSON list of genes, or an object with a `genotype`,
-    /// such as a champion file; with --config.
-    #[arg(long, value_name = "FILE", group = FOREIGN, requires = "config")]
-    genotype: Option<PathBuf>,
     #[command(flatten)]
-    changed: ChangedArg,
+    subject: SubjectArgs,
     #[command(flatten)]
     seed: SeedArg,
     /// Generation of the worlds to simulate, from 0 [default: that of the address; 0 for an
@@ -95,7 +78,8 @@ pub async fn replay(
 ) -> Result<(), Error> {
     let (path, format) = args.path()?;
     args.overwrite.check(&path)?;
-    let Subject { file, genotype, generation, judged } = args.subject(settings, progress).await?;
+    let Subject { file, genotype, generation, judged } =
+        args.subject.find(settings, progress).await?;
     let mut changes = Vec::new();
     for text in &args.set.set {
         let parsed = Change::parse_all(text);
@@ -107,7 +91,7 @@ pub async fn replay(
         Overrides { seed: args.seed.seed, steps: args.steps.steps, ..Overrides::default() };
     let compiled = file.changed(&changes).and_then(|file| file.compile(&overrides));
     let compiled = compiled.map_err(|error| file.invalid(&error))?;
-    let name = args.title(&genotype);
+    let name = args.subject.title(&genotype);
     let episode = Episode {
         config: &compiled.config,
         simulation: &compiled.experiment,
@@ -157,15 +141,6 @@ pub async fn replay(
     })?;
     args.overwrite.write(&path, &bytes)?;
     progress.print(&path.display().to_string())
-}
-
-/// The genotype to replay.
-struct Subject {
-    file: ExperimentFile,
-    genotype: Genotype,
-    /// The generation of the worlds.
-    generation: u64,
-    judged: Option<JudgedFitness>,
 }
 
 /// The requested trial of a judgement, or the median one; and a remark about it.
@@ -223,37 +198,9 @@ fn steps(episode: &Episode<'_>) -> Result<Vec<StepRecord>, Error> {
 }
 
 impl ReplayArgs {
-    /// The experiment, the genotype, and the worlds.
-    async fn subject(&self, settings: Settings, progress: &Progress) -> Result<Subject, Error> {
-        if let (Some(config), Some(genotype)) = (&self.config, &self.genotype) {
-            let file = ExperimentFile::read(config);
-            let file = file.map_err(|error| Error::invalid(config, &error))?;
-            let genotype = Genotype::read(genotype, &file, self.changed)?;
-            return Ok(Subject { file, genotype, generation: 0, judged: None });
-        }
-        let address = self.address.as_ref().expect("clap requires an address or a file");
-        let connection = Connection::open(settings, Intent::Read, progress).await?;
-        let address = connection.resolve(address).await?;
-        let found = connection.genotype(address).await?;
-        let name = format!("experiment {}", address.experiment);
-        let file = ExperimentFile::new(name.into(), found.config_json.clone());
-        let generation = found.individual.generation;
-        let judged = found.individual.judged.filter(|judged| judged.trials > 0);
-        Ok(Subject { file, genotype: Genotype::found(address, found), generation, judged })
-    }
-
-    /// The source of the genotype, for readers of the file. Leaves out the directories of a
-    /// path, which only this machine has.
-    fn title(&self, genotype: &Genotype) -> String {
-        match self.genotype.as_deref().and_then(Path::file_name) {
-            Some(name) => format!("genotype in {}", name.display()),
-            None => genotype.to_string(),
-        }
-    }
-
     /// The file to write.
     fn path(&self) -> Result<(PathBuf, Format), Error> {
-        let path = match (&self.to, &self.address) {
+        let path = match (&self.to, &self.subject.address) {
             (Some(path), _) => path.clone(),
             (None, Some(address)) => {
                 format!("replay-{}.html", address.to_string().replace('/', "-")).into()

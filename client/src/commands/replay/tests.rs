@@ -9,7 +9,7 @@ use super::{picture::Moments, *};
 use crate::{
     cli::Args,
     commands::{Command, one_world::output},
-    experiment_file::tests::quickstart,
+    experiment_file::{ExperimentFile, tests::quickstart},
     output_format::OutputFormat,
     progress::tests::Captured,
 };
