@@ -1,11 +1,14 @@
 //! Scripts in worlds with bodies: what they see, and movables that they put elsewhere.
 
+use std::f64::consts::FRAC_PI_4;
+
 use determinism::Isa;
 use experiment_file::ExperimentConfig;
 use serde_json::{Value, json};
 
 use super::acting::{controlled, failure, watch};
 use super::measured;
+use crate::record::MovableRecord;
 use crate::simulation::Simulation;
 
 /// A room of 200 x 200 cm with a box of 10 x 10 cm at (70, 100), a post at (150, 50) and a wall
@@ -125,6 +128,9 @@ def fitness(world):
     );
     let config = room(&text, 30, &[[50.0, 100.0, 0.0], [50.0, 30.0, 0.0]]);
     let steps = watch(&config);
+    let MovableRecord { position, heading } = steps[29].movables[0];
+    assert_eq!((position.x, position.y), (100.0, 180.0));
+    assert!((heading - FRAC_PI_4).abs() < 1e-9, "{heading}");
     // Nothing is in the robot's way any more.
     assert!((steps[29].fitness.unwrap() - 196.5).abs() < 0.01, "{:?}", steps[29].fitness);
     let simulation = Simulation::compile(&config).unwrap();
