@@ -124,7 +124,7 @@ microcontroller() {
         return
     fi
     # The emulated board has memory at 0 and at 0x20000000.
-    local board=(--specs=rdimon.specs -Wl,--section-start=.vectors=0 -Wl,-Tdata=0x20000000)
+    local board=(--specs=rdimon.specs "-Wl,--section-start=.vectors=0" "-Wl,-Tdata=0x20000000")
     compare $name CC=arm-none-eabi-gcc RUN="$PWD/tests/robots/mps2" \
         "CFLAGS=-O2 ${cpu[*]} ${board[*]} $PWD/tests/robots/start.S -Werror"
     for level in -Os -O2; do
