@@ -33,6 +33,10 @@ const PIPES_PER_PROCESSOR: usize = 2;
 const PROCESSORS_MAX: usize = 32;
 /// Memory that a program needs in addition to the stacks of threads, bytes.
 const MEMORY_MIN: usize = 64 << 20;
+/// Memory that must be free before a thread is tried, bytes: its stack of 2 MiB, and a margin for
+/// the blocks that threads allocate as they begin. Without the margin, the standard library or libc
+/// may end the program within a thread that the system has granted.
+const MEMORY_OF_THREAD: usize = 6 << 20;
 /// Time for ended threads to disappear, ms.
 const GONE_TIME_MS: usize = 1000;
 /// A time longer than any program runs.
@@ -155,7 +159,8 @@ fn granted(n_max: usize) -> (usize, Option<io::Error>) {
         let mut n_granted = 0;
         let mut refusal = None;
         while n_granted < n_max && refusal.is_none() {
-            match thread::Builder::new().spawn_scoped(scope, || drop(hold.read())) {
+            let start = || thread::Builder::new().spawn_scoped(scope, || drop(hold.read()));
+            match find_memory(MEMORY_OF_THREAD).map(drop).and_then(|()| start()) {
                 Ok(_) => n_granted += 1,
                 Err(error) => refusal = Some(error),
             }
