@@ -7,6 +7,7 @@ mod evolution;
 mod experiment;
 mod fitness_log;
 mod genes;
+mod judging;
 mod memory;
 mod record;
 mod running;
@@ -27,6 +28,7 @@ mod _core {
         experiment::{Experiment, inline_script, script_path},
         fitness_log::fitness_log,
         genes::encode_genes,
+        judging::judge,
         memory::ensure_memory,
         record::Record,
         stepping::Episodes,

@@ -40,6 +40,7 @@ from .experiment import Experiment, Measured
 from .files import Archive, open
 from .fleet import Client, FleetRun, connect
 from .generations import Generation
+from .judging import Verdict, judge
 from .local import Interrupted, LocalRun, evolve
 from .mirroring import mirror
 from .network import Network
@@ -54,6 +55,6 @@ __all__ = [
     "EvolutionWarning", "Experiment", "ExperimentError",
     "FINGERPRINT", "FleetError", "FleetRun", "FleetWarning", "ForkError", "GA", "Generation", "Individuals", "InternalError",
     "Interrupted", "Judged", "LocalRun", "Measured", "Network", "NotFound", "OpenAIES", "Origin", "OtherExperimentError", "Problem", "RecordedRun", "RefusedArgument", "Replay", "SNES", "Selection",
-    "SepCMAES", "SwarmError", "Trace", "TrialSet", "Workers", "XNES", "__version__", "algorithms", "connect", "evolve",
+    "SepCMAES", "SwarmError", "Trace", "TrialSet", "Verdict", "Workers", "XNES", "__version__", "algorithms", "connect", "evolve", "judge",
     "mirror", "open", "parallel_env", "workers",
 ]

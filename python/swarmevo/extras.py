@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import Iterator
 
 PACKAGES = {
+    "agents": ("mcp",),
     "analysis": ("scipy",),
     "data": ("pandas", "polars", "pyarrow"),
     "fleet": ("grpc", "google"),

@@ -8,7 +8,7 @@ import uuid
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping, Sequence, TypeVar
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import pandas
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 
 REQUEST_LEN_MAX = 7 << 20
 """Bytes of genes in one request; a coordinator accepts 8 MiB."""
@@ -220,6 +221,25 @@ class Client(Records):
         fitness = np.array([it.values for answer in answers for it in answer.fitness])
         return fitness[0] if is_one else fitness
 
+    def _measured(self, config_json: str, genotype: Floats, trials: int) -> tuple[list[str], list[tuple[float, Floats]]]:
+        """A genotype in trials of :meth:`TrialSet.evaluation`: names of the measures, and of each trial its fitness
+        and its measures ``[steps, measures]``."""
+        call, request_class = self._call_of("EvaluationService", "Evaluate", "unary_stream")
+        request = request_class(config_json=config_json, genotype=genotype, trial_count=trials)
+
+        def read() -> tuple[list[str], list[tuple[float, Floats]]]:
+            names: list[str] = []
+            measured: list[tuple[float, Floats]] = []
+            for it in call(request, metadata=self._metadata):
+                if it.WhichOneof("message") == "task":
+                    names = list(it.task.metrics)
+                else:
+                    values = np.array(it.trial.values).reshape(-1, len(names)) if names else np.empty((0, 0))
+                    measured.append((it.trial.fitness, values))
+            return names, measured
+
+        return self._patiently(read)
+
     def _run(self, experiment_id: int) -> FleetRun:
         return FleetRun(self, experiment_id)
 
@@ -290,7 +310,7 @@ class Client(Records):
                 stacklevel=stacklevel,
             )
 
-    def _patiently(self, attempt: Callable[[], Any]) -> Any:
+    def _patiently(self, attempt: Callable[[], T]) -> T:
         give_up_at = time.monotonic() + self.patience
         while True:
             try:

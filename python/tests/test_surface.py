@@ -139,6 +139,7 @@ def test_replacing_the_algorithm_leaves_no_parameters_behind(quickstart):
 
 
 MISSING = {
+    "agents": ["from swarmevo.agents import server; server({data!r})", "from swarmevo.agents.main import main; main(['--directory', {data!r}])"],
     "data": ["import swarmevo; swarmevo.open({data!r}).experiments()", "run.history()", "trace.to_pandas()", "trace.to_polars()",
              "import swarmevo; swarmevo.open({data!r}).to_parquet({data!r})"],
     "fleet": ["import swarmevo; swarmevo.connect()", "import swarmevo; swarmevo.open({data!r}).runs()"],
