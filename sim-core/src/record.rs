@@ -142,6 +142,6 @@ pub struct ReceivedFrame {
     pub hops: u32,
     /// The sector that received it.
     pub sector: usize,
-    /// Its strength, in (0, 1\].
+    /// Its strength as the radio measures it, in \[0, 1\].
     pub signal: f64,
 }

@@ -3,12 +3,12 @@
 use std::ops::Range;
 
 use crate::communication::Mode;
-use crate::perturbations::Perturbations;
-use crate::sensors::{Noise, NoiseStream, Sensor, Surroundings};
-use crate::swarm::{Received, Swarm};
+use crate::perturbations::{Perturbations, Sensing};
+use crate::sensors::{MountedSensor, Noise, NoiseStream, Sensor, Surroundings};
+use crate::swarm::Swarm;
 use crate::torus::Vec2;
 use crate::world::RobotGroup;
-use determinism::random::{Stream, standard_normal_quantiles};
+use determinism::random::{Purpose, Stream, standard_normal_quantiles};
 use experiment_file::SensorQuery;
 
 /// Readings of the robots of one group in one trial, except those of the radio.
@@ -18,7 +18,21 @@ pub(crate) struct Senses {
     sensors: Vec<SensorState>,
     /// The sources of noise.
     noise: Vec<NoiseSource>,
+    /// `None` without pseudo-reality.
+    distortion: Option<Distortion>,
 }
+
+/// What a pseudo-reality does to the measured values of a group.
+#[derive(Debug, Clone)]
+struct Distortion {
+    sensing: Sensing,
+    /// The noise of each robot; empty without noise.
+    streams: Vec<Stream>,
+}
+
+/// The stream of [`Purpose::PseudoReality`] for the noise of a robot's sensors: 2^32 times this,
+/// plus the robot's number. The number is part of the format of a run.
+const DISTORTION_STREAMS: u64 = 1;
 
 /// The noise of one sensor of a group, or of several that share their streams.
 #[derive(Debug, Clone)]
@@ -47,11 +61,11 @@ struct SensorState {
 }
 
 impl Senses {
-    /// Senses before the first step. `stream` returns a stream of noise by its number.
+    /// Senses before the first step. `stream` returns a stream by its purpose and number.
     pub fn new(
         group: &RobotGroup,
         perturbations: &Perturbations,
-        stream: impl Fn(u64) -> Stream,
+        stream: impl Fn(Purpose, u64) -> Stream,
     ) -> Self {
         let n_robots = group.robots.len();
         let mut sensors = Vec::new();
@@ -61,7 +75,9 @@ impl Senses {
             let source = (deviation > 0.0).then(|| {
                 let known = noise.iter().position(|source| source.key == key);
                 known.unwrap_or_else(|| {
-                    let streams = group.robots.clone().map(|robot| stream(key.number(robot)));
+                    let streams = group.robots.clone();
+                    let streams =
+                        streams.map(|robot| stream(Purpose::SensorNoise, key.number(robot)));
                     let (streams, normals) = (streams.collect(), Vec::new());
                     noise.push(NoiseSource { key, streams, n_sensors: 0, normals });
                     noise.len() - 1
@@ -80,7 +96,14 @@ impl Senses {
                 noise: source,
             });
         }
-        Self { sensors, noise }
+        let distortion = perturbations.reality().map(|reality| {
+            let sensing = reality.sensing;
+            let noisy = group.robots.clone().filter(|_| sensing.is_noisy());
+            let number = |robot| DISTORTION_STREAMS << 32 | robot as u64;
+            let streams = noisy.map(|robot| stream(Purpose::PseudoReality, number(robot)));
+            Distortion { sensing, streams: streams.collect() }
+        });
+        Self { sensors, noise, distortion }
     }
 
     /// Writes one value of a reading, robot by robot. `robots`: the robots of the group.
@@ -99,7 +122,7 @@ impl Senses {
                 fill(row, messages.chunks_exact(swarm.message_len).map(|message| message[value]));
             }
             SensorQuery::ReceiverSignal => {
-                fill(row, received.map(|received| received.map_or(0.0, Received::signal)));
+                fill(row, robots.map(|robot| swarm.signal(robot)));
             }
             SensorQuery::ReceiverReceivingDirection => {
                 fill(
@@ -149,7 +172,7 @@ impl Senses {
             SensorQuery::ReceiverMessage => {
                 swarm.received_messages[swarm.message_range(robot)].to_vec()
             }
-            SensorQuery::ReceiverSignal => vec![received.map_or(0.0, Received::signal)],
+            SensorQuery::ReceiverSignal => vec![swarm.signal(robot)],
             SensorQuery::ReceiverReceivingDirection => {
                 pair(received.map(|frame| frame.receiving_direction))
             }
@@ -180,6 +203,14 @@ impl Senses {
                 let deviation = mounted.sensor.noise().deviation;
                 self.noise[source].add(deviation, *reading_len, readings, is_wanted);
             }
+            if let Some(distortion) = &mut self.distortion
+                && mounted.query != SensorQuery::Script
+            {
+                let each = readings.chunks_exact_mut(*reading_len).zip(&*is_wanted).enumerate();
+                for (robot, (reading, is_wanted)) in each {
+                    distortion.apply(mounted, robot, reading, *is_wanted);
+                }
+            }
             clip(&*mounted.sensor, readings);
         }
     }
@@ -190,8 +221,38 @@ impl Senses {
             if state.query == SensorQuery::Script {
                 let own = &mut state.readings[index * state.reading_len..][..state.reading_len];
                 own.copy_from_slice(reading);
+                if let Some(distortion) = &mut self.distortion {
+                    distortion.apply(mounted, index, own, true);
+                }
                 clip(&*mounted.sensor, own);
             }
+        }
+    }
+}
+
+impl Distortion {
+    /// Distorts a reading of the group's robot number `index`, with one draw per value.
+    fn apply(
+        &mut self,
+        mounted: &MountedSensor,
+        index: usize,
+        reading: &mut [f64],
+        is_wanted: bool,
+    ) {
+        if !mounted.query.is_measured() {
+            return;
+        }
+        let mut noise = self.streams.get_mut(index);
+        if !is_wanted {
+            // The next draw belongs to another sensor.
+            noise.iter_mut().for_each(|noise| noise.skip(reading.len()));
+            return;
+        }
+        let range = mounted.sensor.value_range();
+        let width = range.end() - range.start();
+        for value in reading {
+            let normal = noise.as_mut().map_or(0.0, |noise| noise.normal());
+            *value = self.sensing.distort(*value, width, normal);
         }
     }
 }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::communication::{FrameOrigin, Mode};
 use crate::controllers::Action;
+use crate::perturbations::Sensing;
 use crate::record::{ReceivedFrame, RobotRecord};
 use crate::torus::Vec2;
 
@@ -34,10 +35,30 @@ pub(crate) struct Swarm {
     pub failed: Vec<bool>,
     /// Whether each robot carries something.
     pub carries: Vec<bool>,
+    /// Headings of the radios, in \[0, 2 pi); empty if they are those of their robots.
+    pub antenna_headings: Vec<f64>,
+    /// What a pseudo-reality does to each radio; empty without one.
+    pub radio_flaws: Vec<Option<RadioFlaw>>,
     /// Whether any robot changed its place in this step.
     pub moved: bool,
     /// Whether any robot changed its heading in this step.
     pub turned: bool,
+}
+
+/// What a pseudo-reality does to a robot's radio in a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RadioFlaw {
+    /// What becomes of the strength.
+    pub sensing: Sensing,
+    /// Noise of the strength, a standard normal number.
+    pub normal: f64,
+    /// Whether the robot receives nothing.
+    pub is_lost: bool,
+}
+
+/// The headings of the radios, given those of the robots and `Swarm::antenna_headings`.
+pub(crate) fn antennas<'a>(headings: &'a [f64], antenna_headings: &'a [f64]) -> &'a [f64] {
+    if antenna_headings.is_empty() { headings } else { antenna_headings }
 }
 
 /// A frame taken from the air.
@@ -82,6 +103,8 @@ impl Swarm {
             photosensitive: vec![false; n],
             failed: vec![false; n],
             carries: vec![false; n],
+            antenna_headings: Vec::new(),
+            radio_flaws: Vec::new(),
             moved: true,
             turned: true,
         }
@@ -97,7 +120,7 @@ impl Swarm {
             originator: received.origin.originator,
             hops: received.origin.hops,
             sector: received.sector,
-            signal: received.signal(),
+            signal: self.measured(robot, received.signal()),
         });
         refill(&mut record.received_message, &self.received_messages[message.clone()]);
         record.wheels = self.wheels[robot];
@@ -108,6 +131,30 @@ impl Swarm {
         record.carries = self.carries[robot];
         record.touches = false;
         record.target = None;
+    }
+
+    /// The headings of the radios.
+    pub fn antennas(&self) -> &[f64] {
+        antennas(&self.headings, &self.antenna_headings)
+    }
+
+    /// The strength that a robot's radio measures of a frame of this strength.
+    pub fn measured(&self, robot: usize, strength: f64) -> f64 {
+        match self.radio_flaws.get(robot) {
+            Some(Some(flaw)) => flaw.sensing.distort(strength, 1.0, flaw.normal).clamp(0.0, 1.0),
+            _ => strength,
+        }
+    }
+
+    /// Whether a robot's radio receives nothing in this step.
+    pub fn has_lost(&self, robot: usize) -> bool {
+        matches!(self.radio_flaws.get(robot), Some(Some(flaw)) if flaw.is_lost)
+    }
+
+    /// The strength that a robot's radio measures of the received frame; 0 without a frame.
+    pub fn signal(&self, robot: usize) -> f64 {
+        let received = self.received[robot].as_ref();
+        received.map_or(0.0, |received| self.measured(robot, received.signal()))
     }
 
     /// Range of a robot's message in `messages` and `received_messages`.

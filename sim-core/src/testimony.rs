@@ -66,7 +66,7 @@ pub struct HeardFrame {
     /// (cos, sin) of the emitter's sector that faces the receiver, in the emitter's own frame of
     /// reference; zero if it is not observed.
     pub facing: [f64; 2],
-    /// Its strength, in (0, 1\].
+    /// Its strength as the radio measures it, in \[0, 1\].
     pub signal: f64,
 }
 

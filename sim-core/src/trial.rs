@@ -2,6 +2,7 @@
 
 mod address;
 mod interior;
+mod realities;
 mod starts;
 mod witness;
 
@@ -31,6 +32,7 @@ use task_script::ScriptError;
 
 use self::address::Address;
 pub(crate) use self::interior::Interior;
+use self::realities::Realities;
 use self::starts::Starts;
 pub(crate) use self::starts::{room, try_places};
 
@@ -52,6 +54,8 @@ pub(crate) struct Trial<'a> {
     switches: Switches,
     /// The state of each group of robots, in addition to the swarm's.
     groups: Vec<Group>,
+    /// `None` without pseudo-reality.
+    realities: Option<Realities>,
     /// Streams for stochastic decoding, per robot.
     decoding: Vec<Stream>,
     /// `None`: the script computes the fitness.
@@ -108,11 +112,13 @@ impl<'a> Trial<'a> {
             Starts::draw(address, world)?;
         let mut groups = Vec::with_capacity(world.groups.len());
         for (group, positions) in world.groups.iter().zip(streams) {
-            let perturbations =
-                Perturbations::new(&group.perturbations, group.robots.len(), |number| {
-                    address.stream(Purpose::Perturbation, number)
-                });
-            let noise = |number| address.numbered_stream(Purpose::SensorNoise, number);
+            let perturbations = Perturbations::new(
+                &group.perturbations,
+                group.robots.len(),
+                |number| address.stream(Purpose::Perturbation, number),
+                || address.stream(Purpose::PseudoReality, group.site.object),
+            );
+            let noise = |purpose, number| address.numbered_stream(purpose, number);
             let senses = Senses::new(group, &perturbations, noise);
             groups.push(Group { senses, perturbations, positions });
         }
@@ -132,8 +138,14 @@ impl<'a> Trial<'a> {
                     && !state.perturbations.inhibits(index, SensorQuery::Light);
             }
         }
+        let realities = Realities::new(world, &groups, address);
+        if let Some(realities) = &realities {
+            realities.begin(world, &groups, &mut swarm);
+        }
+        let antennas = Realities::antennas(world, &groups);
         let radio = Radio::new(
             world,
+            &antennas,
             address.streams(Purpose::Reception, n_robots),
             address.streams(Purpose::Quantisation, n_robots),
         );
@@ -142,7 +154,7 @@ impl<'a> Trial<'a> {
             address,
             isa: simulation.isa,
             swarm,
-            neighbours: Neighbours::new(world.sensing_range(), n_robots),
+            neighbours: Neighbours::new(world.sensing_range(&antennas), n_robots),
             audible: world.has_shadows().then(|| Neighbours::new(0.0, n_robots)),
             interior,
             radio,
@@ -151,6 +163,7 @@ impl<'a> Trial<'a> {
             light_paths,
             areas,
             groups,
+            realities,
             decoding: address.streams(Purpose::Decoding, n_robots),
             fitness: simulation
                 .fitness
@@ -198,9 +211,15 @@ impl<'a> Trial<'a> {
         }
         let audible = self.audible.as_ref().unwrap_or(&self.neighbours);
         if moved || turned {
+            if let Some(realities) = &self.realities {
+                realities.turn_antennas(&mut self.swarm);
+            }
             self.radio.listen(audible, &self.swarm);
         }
         self.radio.receive(audible, &mut self.swarm);
+        if let Some(realities) = &mut self.realities {
+            realities.receive(&mut self.swarm);
+        }
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
             let surroundings = Surroundings {
                 torus: &self.world.torus,
@@ -301,8 +320,14 @@ impl<'a> Trial<'a> {
             state.perturbations.rewrite(step, group, &mut self.swarm);
         }
         self.swarm.stop_failed();
-        // Wheels turn.
+        // Wheels turn, in a pseudo-reality otherwise than they are told.
+        if let Some(realities) = &mut self.realities {
+            realities.turn_wheels(&mut self.swarm.wheels);
+        }
         self.drive();
+        if let Some(realities) = &mut self.realities {
+            realities.tell_wheels(&mut self.swarm.wheels);
+        }
         // Every transmitter puts its frame on the air.
         for group in &world.groups {
             self.radio.emit(self.isa, world, &mut self.swarm, group);
@@ -323,8 +348,7 @@ impl<'a> Trial<'a> {
 
     /// The script changes robots, lights and areas after the actions.
     fn react(&mut self, step: u32) -> Result<(), EvaluateError> {
-        if self.run_script(step, ScriptRun::react)?.is_some()
-            && self.radio.mute(self.world, &self.swarm.failed)
+        if self.run_script(step, ScriptRun::react)?.is_some() && self.radio.mute(&self.swarm.failed)
         {
             // Now other robots are the loudest, so hearing changes.
             self.swarm.turned = true;
@@ -336,7 +360,7 @@ impl<'a> Trial<'a> {
     pub fn silence(&mut self, robots: impl Iterator<Item = usize>) {
         let mut silent = self.swarm.failed.clone();
         robots.for_each(|robot| silent[robot] = true);
-        if self.radio.mute(self.world, &silent) {
+        if self.radio.mute(&silent) {
             // Now other robots are the loudest, so hearing changes.
             self.swarm.turned = true;
         }

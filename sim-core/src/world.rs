@@ -189,9 +189,9 @@ impl World {
         }
     }
 
-    /// Distance beyond which no robot senses another one, cm.
-    pub fn sensing_range(&self) -> f64 {
-        let receivers = self.antennas.iter().filter_map(|antenna| antenna.receiver);
+    /// Distance beyond which no robot with these antennas senses another one, cm.
+    pub fn sensing_range(&self, antennas: &[Antenna]) -> f64 {
+        let receivers = antennas.iter().filter_map(|antenna| antenna.receiver);
         let sensors = self.groups.iter().flat_map(|group| &group.sensors);
         let ranges = receivers.map(|receiver| receiver.range);
         ranges.chain(sensors.map(|mounted| mounted.sensor.robots_within())).fold(0.0, f64::max)

@@ -184,6 +184,24 @@ fn every_decoder_computes_the_same_bits() {
     assert_same_bits(&config, &genotype);
 }
 
+/// A pseudo-reality changes what a robot perceives and what becomes of its decisions, but neither
+/// its network nor its radio.
+#[test]
+fn controllers_in_a_pseudo_reality_compute_the_same_bits() {
+    for name in ["leader_selection_snes", "light_follower_snes", "orientation_consensus_snes"] {
+        let (config, genotype) = changed(name, |json| {
+            let robots = json["world"]["objects"].as_object_mut().unwrap().values_mut();
+            let robots = robots.into_iter().find(|object| object["type"] == "robot").unwrap();
+            robots["perturbations"]["pseudo_reality"] = json!({
+                "wheel_gain": 0.8, "wheel_asymmetry": 0.2, "actuation_delay": 2,
+                "sensor_gain": 0.9, "sensor_offset": 0.05, "sensor_noise": 0.1,
+                "radio_range": 1.2, "radio_loss": 0.3, "antenna_heading": 0.4,
+            });
+        });
+        assert_same_bits(&config, &genotype);
+    }
+}
+
 #[test]
 fn names_do_not_break_c() {
     let hostile = ["for", "*/ #error", "größe", "??/", "a%sb", "\"; }", "INT_MAX", "光", "2", "_"];

@@ -67,6 +67,12 @@ pub enum Purpose {
     AreaMovement = 15,
     /// Draws of robots whose sensors a script reads; stream = robot.
     Sensing = 16,
+    /// The pseudo-reality of a trial; stream = index of the object. Stream robot + 2^32 k gives, per
+    /// step, the noise of the robot's sensors (k = 1, one normal per value), the loss of its frame
+    /// (k = 2, one draw), and the noise of the frame's strength (k = 3, one normal).
+    PseudoReality = 17,
+    /// The pseudo-realities of a report; trial = number of the reality, stream 0, one draw per key.
+    Realities = 18,
     /// Variation in evolution; trial = 0, stream = index of the population.
     Evolution = 11,
 }

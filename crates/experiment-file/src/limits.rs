@@ -104,6 +104,8 @@ pub const LATTICE_POINTS: u32 = 4_096;
 pub const HOPS: u32 = 1_000_000;
 /// Stimuli that a robot's `stimuli_inhibition` zeroes.
 pub const INHIBITIONS: usize = 16;
+/// Steps of `actuation_delay`.
+pub const ACTUATION_DELAY: u32 = 50;
 /// Target headings of `uncontrollable_rotation`.
 pub const TARGETS: usize = 1_000;
 

@@ -339,6 +339,22 @@ impl<'a> Node<'a> {
         Some(by_name)
     }
 
+    /// Whether this is a list of two numbers, the larger one first.
+    pub(crate) fn descends(&self) -> bool {
+        let Some(Value::Array(array)) = self.value else { return false };
+        let number = |element: &Value<'_>| match element {
+            Value::NumberLit(literal) => literal.value.parse::<f64>().ok(),
+            _ => None,
+        };
+        let numbers: Vec<_> = array.elements.iter().map(number).collect();
+        matches!(numbers[..], [Some(low), Some(high)] if low > high)
+    }
+
+    /// A silent placeholder for this value.
+    pub(crate) fn silent(&self) -> Self {
+        self.inner(self.path.clone(), None)
+    }
+
     fn inner(&self, path: Path, value: Option<&'a Value<'a>>) -> Self {
         Self { report: self.report, path, value }
     }

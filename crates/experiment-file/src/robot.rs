@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ActuatorsConfig, BodyConfig, Initializer, SensorQuery, SensorsConfig, limits, platform, schema,
+    ActuatorsConfig, BodyConfig, Initializer, PseudoRealityConfig, SensorQuery, SensorsConfig,
+    limits, platform, schema,
 };
 use crate::DefaultValue::{Depends, Name, Null, Number, Numbers, Whole};
 use crate::parameters::{Variants, parameters};
@@ -87,6 +88,8 @@ parameters! {
         /// Robots that turn, whatever their controller decides.
         uncontrollable_rotation: Option<UncontrollableRotationConfig> =
             optional(UncontrollableRotationConfig::OBJECT),
+        /// A world unlike the one of the design.
+        pseudo_reality: Option<PseudoRealityConfig> = optional(PseudoRealityConfig::OBJECT),
     }
 
     /// A robot that has been sole leader too long becomes faulty.

@@ -30,6 +30,16 @@ impl Antenna {
     pub fn reach(&self) -> f64 {
         self.emits_within.unwrap_or(-1.0)
     }
+
+    /// Multiplies the reaches of receiver and transmitter by a factor.
+    pub fn scale(&mut self, factor: f64) {
+        if let Some(reach) = &mut self.emits_within {
+            *reach *= factor;
+        }
+        if let Some(receiver) = &mut self.receiver {
+            receiver.range *= factor;
+        }
+    }
 }
 
 /// The properties of a receiver.

@@ -6,7 +6,7 @@ use super::frame::{Ether, FrameOrigin};
 use super::hearing::{Antenna, Heard, Hearing, Listeners, Receiver};
 use super::quantisation::Scratch;
 use crate::neighbours::Neighbours;
-use crate::swarm::{Received, Swarm};
+use crate::swarm::{Received, Swarm, antennas};
 use crate::testimony::{Frame, HeardFrame};
 use crate::torus::{Vec2, sector_angle};
 use crate::world::{RobotGroup, World};
@@ -27,6 +27,8 @@ impl Receiver {
 pub(crate) struct Radio {
     ether: Ether,
     hearing: Hearing,
+    /// Reach of each transmitter that is not muted, cm; negative if the robot does not emit.
+    reaches: Vec<f64>,
     /// Whether each robot is muted.
     silent: Vec<bool>,
     /// Streams for the choice among valid frames, per robot.
@@ -41,8 +43,13 @@ pub(crate) struct Radio {
 }
 
 impl Radio {
-    /// The air before the first step. One stream per robot for each purpose.
-    pub fn new(world: &World, reception: Vec<Stream>, quantisation: Vec<Stream>) -> Self {
+    /// The air before the first step. One antenna and one stream for each purpose per robot.
+    pub fn new(
+        world: &World,
+        antennas: &[Antenna],
+        reception: Vec<Stream>,
+        quantisation: Vec<Stream>,
+    ) -> Self {
         let mut ether = Ether::new(world.n_robots(), world.message_len);
         let groups = world.groups.iter().filter(|group| group.initial_frame);
         for robot in groups.flat_map(|group| group.robots.clone()) {
@@ -50,7 +57,8 @@ impl Radio {
         }
         Self {
             ether,
-            hearing: Hearing::new(&world.antennas),
+            hearing: Hearing::new(antennas),
+            reaches: antennas.iter().map(Antenna::reach).collect(),
             silent: vec![false; world.n_robots()],
             reception,
             quantisation,
@@ -62,19 +70,18 @@ impl Radio {
 
     /// Updates the hearing after robots have started, moved or turned.
     pub fn listen(&mut self, neighbours: &Neighbours, swarm: &Swarm) {
-        self.hearing.update(neighbours, &swarm.headings);
+        self.hearing.update(neighbours, swarm.antennas());
     }
 
     /// Mutes robots that have failed or are silent. Returns whether the set of muted robots has
     /// changed.
-    pub fn mute(&mut self, world: &World, silent: &[bool]) -> bool {
+    pub fn mute(&mut self, silent: &[bool]) -> bool {
         if self.silent == silent {
             return false;
         }
         self.silent.copy_from_slice(silent);
-        let reach =
-            |(antenna, &silent): (&Antenna, &bool)| if silent { -1.0 } else { antenna.reach() };
-        self.hearing.set_reaches(world.antennas.iter().zip(silent).map(reach));
+        let reach = |(&reach, &silent): (&f64, &bool)| if silent { -1.0 } else { reach };
+        self.hearing.set_reaches(self.reaches.iter().zip(silent).map(reach));
         true
     }
 
@@ -82,6 +89,9 @@ impl Radio {
     /// strongest frame is valid.
     pub fn receive(&mut self, neighbours: &Neighbours, swarm: &mut Swarm) {
         let Self { ether, hearing, reception, valid, .. } = self;
+        let message_len = swarm.message_len;
+        let Swarm { received, received_messages, headings, antenna_headings, .. } = swarm;
+        let headings = antennas(headings, antenna_headings);
         for listeners in hearing.listeners() {
             let receiver = listeners.receiver;
             valid.resize(receiver.n_sectors + 1, 0);
@@ -95,10 +105,9 @@ impl Radio {
                 }
                 // One draw per step, needed or not.
                 let u = reception[robot].uniform();
-                let message = swarm.message_range(robot);
-                let message = &mut swarm.received_messages[message];
+                let message = &mut received_messages[robot * message_len..][..message_len];
                 if n_valid == 0 {
-                    swarm.received[robot] = None;
+                    received[robot] = None;
                     message.fill(0.0);
                     continue;
                 }
@@ -106,7 +115,6 @@ impl Radio {
                 let heard = heard[sector];
                 let emitter = heard.robot as usize;
                 message.copy_from_slice(ether.message(emitter));
-                let headings = &swarm.headings;
                 let sending_direction = if receiver.observes_sending_direction {
                     hearing.sending_direction(listeners, heard, neighbours, headings)
                 } else {
@@ -120,7 +128,7 @@ impl Radio {
                 }
                 let log_strength =
                     listeners.log_strength(robot, sector, heard, neighbours, headings);
-                swarm.received[robot] = Some(Received {
+                received[robot] = Some(Received {
                     emitter,
                     sector,
                     log_strength,
@@ -135,13 +143,10 @@ impl Radio {
         }
     }
 
-    /// The strongest frame in each sector of a robot; empty without a receiver.
-    pub fn heard(
-        &self,
-        robot: usize,
-        neighbours: &Neighbours,
-        headings: &[f64],
-    ) -> Vec<HeardFrame> {
+    /// The strongest frame in each sector of a robot, with the strength that its radio measures;
+    /// empty without a receiver. A radio that loses its frame has heard nothing.
+    pub fn heard(&self, robot: usize, neighbours: &Neighbours, swarm: &Swarm) -> Vec<HeardFrame> {
+        let headings = swarm.antennas();
         let mut listeners = self.hearing.listeners().iter();
         let own = listeners.find_map(|listeners| {
             let (_, heard) = listeners.iter().find(|(listener, _)| *listener == robot)?;
@@ -150,7 +155,7 @@ impl Radio {
         let Some((listeners, heard)) = own else { return Vec::new() };
         let hear = |(sector, &heard): (usize, &Heard)| {
             let emitter = heard.robot as usize;
-            if emitter == self.silent.len() {
+            if emitter == self.silent.len() || swarm.has_lost(robot) {
                 let message = vec![0.0; self.ether.message_len()];
                 let frame = Frame::new(FrameOrigin::NOTHING, &message);
                 return HeardFrame { frame, facing: [0.0; 2], signal: 0.0 };
@@ -160,7 +165,7 @@ impl Radio {
             HeardFrame {
                 frame: self.sent(emitter),
                 facing: [facing.x, facing.y],
-                signal: libm::exp(log_strength),
+                signal: swarm.measured(robot, libm::exp(log_strength)),
             }
         };
         heard.iter().enumerate().map(hear).collect()

@@ -2,10 +2,12 @@
 
 mod inhibition;
 mod leader_failure;
+mod reality;
 mod rotation;
 
 use inhibition::Inhibition;
 use leader_failure::LeaderFailure;
+pub(crate) use reality::{Reality, Sensing};
 use rotation::Rotation;
 
 use crate::swarm::Swarm;
@@ -26,15 +28,17 @@ pub(crate) struct Perturbations {
     rotation: Option<Rotation>,
     /// Period at which positions are redrawn, steps.
     switch_every: Option<u32>,
+    reality: Option<Reality>,
 }
 
 impl Perturbations {
-    /// Draws the affected robots among `n_robots`; `stream` gives the trial's streams for
-    /// perturbations by number.
+    /// Draws the affected robots among `n_robots`, and their reality. `stream` gives the trial's
+    /// streams for perturbations by number, and `reality` that of the pseudo-reality.
     pub fn new(
         config: &PerturbationsConfig,
         n_robots: usize,
         stream: impl Fn(usize) -> Stream,
+        reality: impl FnOnce() -> Stream,
     ) -> Self {
         let leader_failure = config.leader_failure.as_ref();
         let rotation = config.uncontrollable_rotation.as_ref();
@@ -49,7 +53,16 @@ impl Perturbations {
             rotation: rotation
                 .map(|config| Rotation::new(config, n_robots, &mut stream(ROTATION_STREAM))),
             switch_every: config.topology_switch.as_ref().map(|config| config.every),
+            reality: config
+                .pseudo_reality
+                .as_ref()
+                .map(|config| Reality::new(config, n_robots, &mut reality())),
         }
+    }
+
+    /// The pseudo-reality.
+    pub fn reality(&self) -> Option<&Reality> {
+        self.reality.as_ref()
     }
 
     /// Whether positions are redrawn at the start of `step` (`topology_switch`).
@@ -78,6 +91,10 @@ impl Perturbations {
     /// Rewrites the actions of the group.
     pub fn rewrite(&mut self, step: u32, group: &RobotGroup, swarm: &mut Swarm) {
         let robots = group.robots.clone();
+        // Other perturbations see what the robots do now.
+        if let Some(reality) = &mut self.reality {
+            reality.delay(&mut swarm.wheels[robots.clone()], &mut swarm.leds[robots.clone()]);
+        }
         if let Some(failure) = &mut self.leader_failure {
             failure.rewrite(&mut swarm.leds[robots.clone()], &mut swarm.modes[robots.clone()]);
         }
@@ -135,11 +152,12 @@ mod tests {
             topology_switch: Some(TopologySwitchConfig { every: 200 }),
             ..Default::default()
         };
-        let perturbations = Perturbations::new(&config, 10, stream);
+        let perturbations = Perturbations::new(&config, 10, stream, || unreachable!());
         let switches: Vec<u32> =
             (0..700).filter(|&step| perturbations.switches_topology(step)).collect();
         assert_eq!(switches, [200, 400, 600]);
-        let none = Perturbations::new(&PerturbationsConfig::default(), 10, stream);
+        let none = PerturbationsConfig::default();
+        let none = Perturbations::new(&none, 10, stream, || unreachable!());
         assert!((0..700).all(|step| !none.switches_topology(step)));
     }
 }

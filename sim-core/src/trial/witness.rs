@@ -35,7 +35,7 @@ impl Trial<'_> {
     /// What a robot's radio heard, chose and reads in this step, before the actions.
     pub fn hear(&self, robot: usize, radio: &mut RadioTestimony) {
         let neighbours = self.audible.as_ref().unwrap_or(&self.neighbours);
-        radio.heard = self.radio.heard(robot, neighbours, &self.swarm.headings);
+        radio.heard = self.radio.heard(robot, neighbours, &self.swarm);
         radio.sector = self.swarm.received[robot].as_ref().map(|received| received.sector);
         let number = self.world.group_of(robot);
         let (robots, senses) = (&self.world.groups[number].robots, &self.groups[number].senses);

@@ -5,6 +5,7 @@ mod genotypes;
 mod leaders;
 mod learning;
 mod movers;
+mod realities;
 mod semantics;
 mod sensors;
 mod spiking;

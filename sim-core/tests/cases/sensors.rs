@@ -14,7 +14,7 @@ use crate::reference::Episode;
 
 /// Experiment D with every sensor and without its perturbation, scored by all
 /// headings and wheels.
-fn all_sensors() -> ExperimentConfig {
+pub fn all_sensors() -> ExperimentConfig {
     let mut config = experiment_d();
     config.algorithm.fitness_function = FitnessFunction::OrientationConsensus;
     config.algorithm.evaluation_steps = 60;

@@ -79,7 +79,8 @@ fn category(values: &[f64]) -> u32 {
 /// Eq. 3.3-3.6: motion on an arc during one environment step, straight in the
 /// limit.
 pub fn drive(robot: &mut Robot<'_>, config: &WheelActuatorConfig, torus: Torus) {
-    let [v_right, v_left] = robot.wheels.map(|action| action * config.max_speed);
+    let factors = robot.reality.as_ref().map_or([1.0; 2], |reality| reality.wheel_factors);
+    let [v_right, v_left] = [0, 1].map(|i| robot.wheels[i] * factors[i] * config.max_speed);
     let v = (v_right + v_left) / 2.0;
     let omega = (v_right - v_left) / config.axle_length;
     let dk = config.step_duration;

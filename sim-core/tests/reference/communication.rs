@@ -124,7 +124,7 @@ pub fn receive(
     let config = own.config.sensors.wireless_receiver.as_ref()?;
     let mut candidates = Vec::new();
     for j in 0..config.n_sectors {
-        let sector = sector_direction(own.heading, j, config.n_sectors);
+        let sector = sector_direction(own.antenna_heading(), j, config.n_sectors);
         let mut strongest: Option<(f64, usize, &Frame)> = None;
         for (emitter, robot) in robots.iter().enumerate() {
             let Some(frame) = &robot.on_air else { continue };
@@ -133,7 +133,8 @@ pub fn receive(
             }
             let rho = torus.distance(own.position, robot.position);
             let phi = angular_difference(sector, torus.bearing(own.position, robot.position));
-            let reach = config.range.min(robot.transmitter().range);
+            let reach = (own.radio_range() * config.range)
+                .min(robot.radio_range() * robot.transmitter().range);
             if rho > reach || phi > PI / f64::from(config.n_sectors) {
                 continue;
             }
@@ -181,7 +182,8 @@ fn observed_sending_direction(emitter: &Robot<'_>, receiver: Vector, torus: Toru
     let mut facing = 0;
     let mut least = f64::INFINITY;
     for s in 0..n {
-        let difference = angular_difference(sector_direction(emitter.heading, s, n), bearing);
+        let difference =
+            angular_difference(sector_direction(emitter.antenna_heading(), s, n), bearing);
         if difference < least {
             least = difference;
             facing = s;

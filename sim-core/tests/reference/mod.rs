@@ -20,6 +20,7 @@ mod learning;
 mod lights;
 mod network;
 mod perturbations;
+mod reality;
 mod sensors;
 mod spiking;
 mod torus;

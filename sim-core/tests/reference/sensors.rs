@@ -147,7 +147,8 @@ pub fn ground(color: &str, position: Vector, areas: &[Area<'_>], torus: Torus) -
     if areas.iter().any(stands_on) { 1.0 } else { 0.0 }
 }
 
+/// The value with noise, outside of the sensor's range, too.
 fn with_noise(value: f64, variance: f64, noise: &mut Stream) -> f64 {
     let noise = if variance == 0.0 { 0.0 } else { noise.normal() * variance.sqrt() };
-    (value + noise).clamp(0.0, 1.0)
+    value + noise
 }

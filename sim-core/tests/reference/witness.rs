@@ -18,6 +18,8 @@ pub struct Witness {
     pub n_lit: usize,
     /// Largest LED colour.
     pub max_color: u32,
+    /// Robot-steps in which a pseudo-reality lost a frame.
+    pub n_lost: usize,
     /// Robots that became faulty.
     pub n_faults: usize,
     /// Readings of the light, distance and ground sensors that are not 0.

@@ -14,6 +14,7 @@ use super::initializers::{headings, positions};
 use super::learning::Learner;
 use super::lights::Light;
 use super::perturbations::{SoleLeader, affected_robots, inhibits, rotation};
+use super::reality::{self, Reality};
 use super::sensors::{self, Readings};
 use super::spiking::SpikingState;
 use super::torus::{Torus, Vector};
@@ -43,6 +44,7 @@ pub struct Robot<'a> {
     /// Whether it is affected, per entry of `stimuli_inhibition`.
     is_inhibited: Vec<bool>,
     is_uncontrollable: bool,
+    pub reality: Option<Reality>,
     reception: Stream,
     quantisation: Stream,
     decoding: Stream,
@@ -67,6 +69,16 @@ impl Robot<'_> {
         let receiver = self.config.sensors.wireless_receiver.as_ref();
         let receiver = receiver.expect("the fitness function needs a receiver");
         receiver.range.min(self.transmitter().range)
+    }
+
+    /// Heading of the robot's radio.
+    pub fn antenna_heading(&self) -> f64 {
+        self.heading + self.reality.as_ref().map_or(0.0, |reality| reality.antenna_angle)
+    }
+
+    /// Factor of the reach of the robot's radio.
+    pub fn radio_range(&self) -> f64 {
+        self.reality.as_ref().map_or(1.0, |reality| reality.radio_range)
     }
 
     /// Message length M; 0 without a wireless link.
@@ -185,6 +197,8 @@ impl<'a> Simulation<'a> {
             perturbations.uncontrollable_rotation.as_ref().map(|config| config.affected_robots),
             3,
         );
+        let first = self.robots.len();
+        let mut realities = reality::of_object(config, object_idx, first, stream).into_iter();
         let positions = self.draw_positions(object_idx, &config.initializers.positions, n);
         let mut orientations = stream(Purpose::Orientations, object_idx);
         let headings = headings(&config.initializers.orientations, n, &mut orientations);
@@ -214,6 +228,7 @@ impl<'a> Simulation<'a> {
                 is_faulty: false,
                 is_inhibited: inhibited.iter().map(|robots| robots[i]).collect(),
                 is_uncontrollable: uncontrollable[i],
+                reality: realities.next(),
                 reception: stream(Purpose::Reception, number),
                 quantisation: stream(Purpose::Quantisation, number),
                 decoding: stream(Purpose::Decoding, number),
@@ -282,7 +297,12 @@ impl<'a> Simulation<'a> {
     /// last step put on the air.
     fn sense(&mut self, i: usize) -> Readings {
         let uniform = self.robots[i].reception.uniform();
-        let reception = receive(i, &self.robots, self.torus, uniform);
+        let mut reception = receive(i, &self.robots, self.torus, uniform);
+        if let Some(reality) = &mut self.robots[i].reality {
+            let had_frame = reception.is_some();
+            reception = reality.received(reception);
+            self.witness.n_lost += usize::from(had_frame && reception.is_none());
+        }
         if let Some(reception) = &reception {
             self.witness.n_receptions += 1;
             self.witness.n_relayed_receptions += usize::from(reception.hops > 1);
@@ -299,14 +319,27 @@ impl<'a> Simulation<'a> {
             sensors::distance(config, i, &self.robots, self.torus, &mut noise)
         });
         let on = |color: &str| sensors::ground(color, robot.position, &self.areas, self.torus);
-        let ground = sensors.ground_sensor.as_ref().map_or(0.0, |config| on(&config.color));
-        let (food_area, nest) = (on("green"), on("black"));
+        let ground = sensors.ground_sensor.as_ref().map(|config| on(&config.color));
+        let food_area = sensors.food_area_sensor.as_ref().map(|_| on("green"));
+        let nest = sensors.nest_sensor.as_ref().map(|_| on("black"));
+        let mut distortion = robot.reality.as_ref().map(|reality| reality.noise.clone());
+        let mut measure = |value: f64| match (&robot.reality, &mut distortion) {
+            (Some(reality), Some(noise)) => reality.measured(value, noise),
+            _ => value.clamp(0.0, 1.0),
+        };
+        let light: Vec<f64> = light.into_iter().map(&mut measure).collect();
+        let distance: Vec<f64> = distance.into_iter().map(&mut measure).collect();
+        let [ground, food_area, nest] =
+            [ground, food_area, nest].map(|value| value.map_or(0.0, &mut measure));
         let neighborhood = sensors.neighborhood_pos_sensor.as_ref().map_or(vec![], |config| {
             sensors::neighborhood(config.n_neighbors as usize, i, &self.robots, self.torus)
         });
         let (position, orientation) = (robot.position, robot.heading / std::f64::consts::TAU);
         let state = if robot.send { 1.0 } else { 0.0 };
         self.robots[i].noise = noise;
+        if let (Some(reality), Some(distortion)) = (&mut self.robots[i].reality, distortion) {
+            reality.noise = distortion;
+        }
         let n_not_zero = |values: &[f64]| values.iter().filter(|&&value| value != 0.0).count();
         self.witness.n_light += n_not_zero(&light);
         self.witness.n_distance += n_not_zero(&distance);
@@ -379,8 +412,11 @@ impl<'a> Simulation<'a> {
         actions
     }
 
-    /// `leader_failure` and `uncontrollable_rotation`.
+    /// `pseudo_reality`, `leader_failure` and `uncontrollable_rotation`.
     fn perturb(&mut self, i: usize, mut actions: Actions) -> Actions {
+        if let Some(reality) = &mut self.robots[i].reality {
+            actions = reality.delayed(actions);
+        }
         let robot = &self.robots[i];
         if robot.is_faulty {
             actions.led = 0;

@@ -150,6 +150,7 @@ const PERTURBATIONS: &[Section] = &[
     at("perturbations.stimuli_inhibition", &[("StimuliInhibitionConfig", "")]),
     at("perturbations.topology_switch", &[("TopologySwitchConfig", "")]),
     at("perturbations.uncontrollable_rotation", &[("UncontrollableRotationConfig", "")]),
+    at("perturbations.pseudo_reality", &[("PseudoRealityConfig", "")]),
 ];
 
 const NETWORK: &[Section] = &[

@@ -84,6 +84,9 @@ impl Schema {
         if let [one, list] = variants
             && list["items"] == *one
         {
+            if list["minItems"] == 2 && list["maxItems"] == 2 {
+                return format!("{}, or a range `[low, high]`", self.values(one, unit));
+            }
             return format!("{} or a list of them", self.values(one, unit));
         }
         let mut words: Vec<String> =

@@ -90,6 +90,10 @@ pub enum Domain {
     Points(usize, usize),
     /// The only whole number that other parts of the file allow.
     Certain,
+    /// A number in this closed interval, or a range `[low, high]` in it.
+    Drawn(f64, f64),
+    /// A whole number in this closed interval, or a range `[low, high]` in it.
+    DrawnWhole(u32, u32),
     /// A name, or a list of them.
     Names,
     /// An object of parameters.
@@ -200,6 +204,12 @@ constructors! {
     /// A whole number in a closed interval.
     pub whole(range: [u32; 2], default: u32) =
         Domain::Whole(range[0], range[1]), DefaultValue::Whole(default);
+    /// A number in a closed interval, or a range from which each trial draws.
+    pub(crate) drawn(range: [f64; 2], default: f64) =
+        Domain::Drawn(range[0], range[1]), DefaultValue::Number(default);
+    /// A whole number in a closed interval, or a range from which each trial draws.
+    pub(crate) drawn_whole(range: [u32; 2], default: u32) =
+        Domain::DrawnWhole(range[0], range[1]), DefaultValue::Whole(default);
     /// A whole number below `population_size`.
     pub below_population_size(default: u32) =
         Domain::BelowPopulationSize, DefaultValue::Whole(default);

@@ -3,9 +3,9 @@
 use std::ops::RangeInclusive;
 
 use super::{DefaultValue, Domain, Original, Parameter, ParameterValue, Parameters, Params, Table};
-use crate::limits;
 use crate::node::{Node, Object};
 use crate::semantics::Semantics;
+use crate::{Drawn, limits};
 
 /// Defaults, by key, of parameters whose default depends on other parts of the file. The keys of an
 /// object within are paths, as in `body.radius`.
@@ -241,6 +241,8 @@ impl Parameter {
                 };
                 node.u32(n..=n).into()
             }
+            Domain::Drawn(min, max) => drawn(node, |node| node.number(min..=max)).into(),
+            Domain::DrawnWhole(min, max) => drawn(node, |node| node.u32(min..=max)).into(),
             Domain::Names => ParameterValue::Names(node.names()),
             Domain::Object(object) => {
                 (object.read)(node, semantics, &within(given, self.key)).into()
@@ -258,6 +260,23 @@ impl Parameter {
 pub(crate) fn points(node: Node<'_>, lengths: RangeInclusive<usize>) -> Vec<[f64; 2]> {
     let point = |node| numbers(node, 2..=2).try_into().unwrap_or_default();
     node.list(lengths).into_iter().map(point).collect()
+}
+
+/// A number, or a range.
+fn drawn<T: Copy + PartialOrd>(node: Node<'_>, read: impl Fn(Node<'_>) -> T) -> Drawn<T> {
+    if !node.is_list() {
+        return Drawn::always(read(node));
+    }
+    if node.descends() {
+        node.problem("the range ends below its beginning; expected [low, high]");
+    }
+    let placeholder = node.silent();
+    let ends: Vec<T> = node.list(2..=2).into_iter().map(&read).collect();
+    match ends[..] {
+        [low, high] if low <= high => Drawn { low, high },
+        [low, _] => Drawn::always(low),
+        _ => Drawn::always(read(placeholder)),
+    }
 }
 
 fn numbers(node: Node<'_>, lengths: RangeInclusive<usize>) -> Vec<f64> {

@@ -101,6 +101,8 @@ impl Parameter {
             // The lengths depend on other parts of the file.
             Domain::Vectors(max) => list(list(quantity(), 1, 2), 1, max),
             Domain::Points(min, max) => points_schema(min, max),
+            Domain::Drawn(min, max) => drawn(number(min, max)),
+            Domain::DrawnWhole(min, max) => drawn(whole(min, max)),
             Domain::Certain => whole(0, u32::MAX),
             Domain::Names => schema::names(generator).to_value(),
             Domain::Object(object) => (object.schema)(generator).to_value(),
@@ -139,6 +141,11 @@ fn quantity() -> Value {
 /// Of a list of points `[x, y]`.
 pub(crate) fn points_schema(min: usize, max: usize) -> Value {
     list(list(quantity(), 2, 2), min, max)
+}
+
+/// Of a number, or a range.
+fn drawn(number: Value) -> Value {
+    json!({"anyOf": [number, list(number.clone(), 2, 2)]})
 }
 
 /// Of a list.

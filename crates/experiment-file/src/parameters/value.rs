@@ -28,6 +28,8 @@ pub enum ParameterValue {
     Switch(bool),
     /// Several numbers.
     Numbers(Vec<f64>),
+    /// Several whole numbers.
+    Wholes(Vec<u32>),
     /// Several lists of numbers.
     Vectors(Vec<Vec<f64>>),
     /// Several names.
@@ -256,6 +258,7 @@ impl fmt::Display for ParameterValue {
             Self::Name(name) => write!(f, "`{name}`"),
             Self::Switch(switch) => write!(f, "{switch}"),
             Self::Numbers(numbers) => write!(f, "{numbers:?}"),
+            Self::Wholes(numbers) => write!(f, "{numbers:?}"),
             Self::Vectors(vectors) => write!(f, "{vectors:?}"),
             Self::Names(names) => write!(f, "`{}`", names.join("`, `")),
             Self::Object(_) | Self::Objects(_) => f.write_str("an object"),

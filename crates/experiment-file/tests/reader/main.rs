@@ -9,6 +9,7 @@ mod original;
 mod parameters;
 mod platforms;
 mod problems;
+mod realities;
 mod reference;
 mod schema;
 mod sensors;

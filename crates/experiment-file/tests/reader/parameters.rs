@@ -185,7 +185,9 @@ fn the_reader_refuses_a_value_of_a_parameter_if_the_schema_does() {
 fn a_default_of_the_schema_means_the_same_as_no_key() {
     let root = json_schema(ALGORITHMS);
     let mut seen = BTreeSet::new();
-    for file in files().filter(|file| file["semantics"] != "original") {
+    // A platform has its own defaults.
+    let is_plain = |file: &Value| !file.to_string().contains(r#""platform":"#);
+    for file in files().filter(|file| file["semantics"] != "original" && is_plain(file)) {
         for probe in probes(&root, &file) {
             let default = probe.schema.as_ref().and_then(|schema| schema.get("default"));
             let Some(default) = default.filter(|_| !seen.contains(&probe.parameter)) else {

@@ -2,7 +2,9 @@
 
 use determinism::Isa;
 use determinism::random::TrialSet;
-use experiment_file::{ExperimentConfig, ObjectConfig, RobotConfig, RobotController};
+use experiment_file::{
+    Drawn, ExperimentConfig, ObjectConfig, PseudoRealityConfig, RobotConfig, RobotController,
+};
 use serde_json::json;
 
 use super::acting::{failure, watch};
@@ -51,6 +53,20 @@ fn the_clamped_result_of_sense_reaches_networks_in_the_same_step() {
     assert_eq!(said(&config, 4), [[1.0, 1.0], [0.0, 1.0], [-1.0, 1.0]]);
     let text = "def sense(robot):\n    return [1e300, -1e300]";
     assert_eq!(said(&sensing(&format!("{text}{FITNESS}"), 1), 0), [[2.0, -1.0]]);
+}
+
+#[test]
+fn a_pseudo_reality_distorts_what_sense_returns() {
+    let text = "def sense(robot):\n    return (robot.id / 4, 1)";
+    let mut config = sensing(&format!("{text}{FITNESS}"), 2);
+    robots(&mut config).perturbations.pseudo_reality = Some(PseudoRealityConfig {
+        sensor_gain: Drawn::always(0.5),
+        sensor_offset: Drawn::always(0.25),
+        ..Default::default()
+    });
+    // The range from -1 to 2 has a width of 3.
+    assert_eq!(said(&config, 1), [[0.875, 1.25]; 2]);
+    assert_eq!(said(&config, 9), [[1.875, 1.25]; 2]);
 }
 
 #[test]

@@ -168,7 +168,9 @@ impl Checks<'_> {
             }
         }
         let (radius, what) = narrowest;
-        let step = wheels.max_speed * wheels.step_duration;
+        let reality = robot.perturbations.pseudo_reality;
+        let factor = reality.map_or(1.0, |reality| reality.wheel_factor_max());
+        let step = wheels.max_speed * factor * wheels.step_duration;
         let is_slow = |substeps: u32| step / f64::from(substeps) <= radius / 2.0;
         if is_slow(substeps) {
             return;

@@ -204,8 +204,31 @@ impl Robot {
             );
             insert(&mut perturbations, "uncontrollable_rotation", rotation);
         }
+        if dice.chance(0.3) {
+            insert(&mut perturbations, "pseudo_reality", reality(dice));
+        }
         perturbations
     }
+}
+
+fn reality(dice: &mut Dice) -> Value {
+    let mut drawn = |low: f64, high: f64| match dice.chance(0.5) {
+        true => dice.number(low, high),
+        false => json!([dice.number(low, low), dice.number(low, high)]),
+    };
+    let keys = [
+        ("wheel_gain", drawn(0.5, 1.5)),
+        ("wheel_asymmetry", drawn(0.0, 0.2)),
+        ("slow_robot", drawn(0.0, 1.0)),
+        ("sensor_gain", drawn(0.5, 1.5)),
+        ("sensor_offset", drawn(-0.1, 0.1)),
+        ("sensor_noise", drawn(0.0, 0.1)),
+        ("radio_range", drawn(0.5, 1.5)),
+        ("radio_loss", drawn(0.0, 1.0)),
+        ("antenna_heading", drawn(0.0, 3.0)),
+        ("actuation_delay", json!([0, dice.below(5)])),
+    ];
+    object(dice, keys)
 }
 
 fn light(dice: &mut Dice) -> Value {
