@@ -30,6 +30,22 @@ impl Json {
         path.into_iter().try_fold(self, |place, key| place.object()?.get(key))
     }
 
+    /// The same, to change it.
+    pub fn get_mut<'a>(&mut self, path: impl IntoIterator<Item = &'a str>) -> Option<&mut Self> {
+        path.into_iter().try_fold(self, |place, key| match place {
+            Self::Object(object) => object.get_mut(key),
+            _ => None,
+        })
+    }
+
+    /// Removes a key of an object; returns whether it was there.
+    pub fn remove(&mut self, key: &str) -> bool {
+        match self {
+            Self::Object(object) => object.shift_remove(key).is_some(),
+            _ => false,
+        }
+    }
+
     pub fn object(&self) -> Option<&IndexMap<String, Self>> {
         if let Self::Object(object) = self { Some(object) } else { None }
     }

@@ -1,5 +1,6 @@
 //! `swarmctl compare`: compares samples of runs.
 
+mod realities;
 mod report;
 mod samples;
 
@@ -24,6 +25,7 @@ use crate::{
 };
 
 use self::{
+    realities::{Ranking, is_evaluation},
     report::Report,
     samples::{Sample, Samples},
 };
@@ -44,7 +46,9 @@ const POINTS_MAX: usize = 200;
 pub struct CompareArgs {
     /// Names of groups, numbers of experiments, or files: histories (.csv) that `swarmctl
     /// history` wrote and champions (.json) that `swarmctl champion` or `swarmctl run` wrote.
-    #[arg(required = true, value_name = "GROUP|ID|FILE", add = ArgValueCompleter::new(complete::experiments_and_files))]
+    /// Or directories that `swarmctl evaluate --pseudo-realities` wrote, one per champion: then the
+    /// champions are ranked by their fitness in the pseudo-realities, beside the nominal ranking.
+    #[arg(required = true, value_name = "GROUP|ID|FILE|DIR", add = ArgValueCompleter::new(complete::experiments_and_files))]
     pub runs: Vec<String>,
     /// Number of last generations to average in each run; a shorter run is averaged whole.
     #[arg(long, value_name = "N", default_value_t = LAST, value_parser = clap::value_parser!(u64).range(1..))]
@@ -71,6 +75,7 @@ of pairs.
 Examples:
   swarmctl compare leader_selection_snes leader_selection_ga --target 1
   swarmctl compare results/{histories,champions}/leader_selection_{snes,ga}-*
+  swarmctl compare realities/champion-*
   swarmctl compare sizes --to sizes.svg --output json";
 
 /// Reads the runs and compares them. Asks the coordinator only about runs without a file.
@@ -79,6 +84,9 @@ pub async fn compare(
     args: &CompareArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
+    if args.runs.iter().any(|text| is_evaluation(text)) {
+        return rank(args, progress);
+    }
     // Refuses a bad name of the figure before reading anything.
     args.to.as_deref().map(|to| Format::check(to, args.overwrite)).transpose()?;
     if args.target.is_some_and(|target| !target.is_finite()) {
@@ -107,6 +115,23 @@ pub async fn compare(
     match progress.is_json() {
         true => progress.print(&json::document(&report)),
         false => progress.print_parts(&report.to_parts()),
+    }
+}
+
+/// Ranks champions by their evaluations in pseudo-realities.
+fn rank(args: &CompareArgs, progress: &mut Progress) -> Result<(), Error> {
+    if let Some(other) = args.runs.iter().find(|text| !is_evaluation(text)) {
+        let problem = format!("{other} is no directory of an evaluation, as the others are");
+        return Err(Error::Input(problem));
+    }
+    if args.to.is_some() || args.target.is_some() {
+        let problem = "--to and --target compare runs, not evaluations of champions";
+        return Err(Error::Input(problem.into()));
+    }
+    let ranking = Ranking::read(&args.runs)?;
+    match progress.is_json() {
+        true => progress.print(&json::document(&ranking)),
+        false => progress.print_parts(&ranking.to_parts()),
     }
 }
 

@@ -4,6 +4,7 @@ mod args;
 mod conditions;
 mod files;
 mod measured;
+mod realities;
 mod statistics;
 mod summary;
 
@@ -32,9 +33,10 @@ use crate::{
 
 pub use self::args::EvaluateArgs;
 use self::{
-    conditions::Condition,
+    conditions::{Condition, Role},
     files::Results,
     measured::Measured,
+    realities::Robustness,
     summary::{Subject, Summary},
 };
 use super::{run::log, simulate::genotype::Genotype};
@@ -71,7 +73,7 @@ async fn evaluate_all(
     args.overwrite.check_files(&args.to, &files::NAMES)?;
     let (file, genotype) = subject(settings.clone(), args, progress).await?;
     let remote = remote(settings, args, progress).await?;
-    let conditions = conditions::all(&file, args)?;
+    let (conditions, realities) = conditions::all(&file, args)?;
     for condition in &conditions {
         condition.check(&genotype)?;
     }
@@ -86,7 +88,9 @@ async fn evaluate_all(
     };
     results.write_steps(&conditions, &measured, args.every)?;
     results.write_trials(&conditions, &measured)?;
-    let summary = Summary::new(&Subject::new(&conditions, &genotype), &conditions, &measured);
+    let subject = Subject::new(&conditions, &genotype);
+    let robustness = realities.map(|realities| Robustness::new(&realities, &conditions, &measured));
+    let summary = Summary::new(&subject, &conditions, &measured).with(robustness);
     results.write("summary.json", &(json::document(&summary) + "\n"))?;
     results.finish()?;
     if progress.is_json() {
@@ -97,7 +101,10 @@ async fn evaluate_all(
         args.trials,
         args.to.display()
     );
-    progress.print_parts(&[Part::Table(table(&summary)), Part::Text(where_it_is)])
+    let mut parts = vec![Part::Table(table(&summary, &conditions))];
+    parts.extend(summary.pseudo_realities.iter().flat_map(Robustness::to_parts));
+    parts.push(Part::Text(where_it_is));
+    progress.print_parts(&parts)
 }
 
 /// The coordinator whose fleet computes; none if this process computes, as on a data
@@ -239,13 +246,15 @@ async fn ask_all(
         .collect())
 }
 
-/// For people: means over trials and steps, with their confidence intervals.
-fn table(summary: &Summary) -> Table {
+/// For people: means over trials and steps, with their confidence intervals. Pseudo-realities have
+/// a table of their own.
+fn table(summary: &Summary, conditions: &[Condition]) -> Table {
     let names = summary.metric_names();
     let columns = [Column::text("condition"), Column::number("fitness")].into_iter();
     let measures = table::measures(names.iter().map(String::as_str));
     let mut table = Table::new(columns.chain(measures).collect::<Vec<_>>());
-    for condition in &summary.conditions {
+    let shown = conditions.iter().map(|condition| condition.role == Role::Other);
+    for (condition, _) in summary.conditions.iter().zip(shown).filter(|(_, shown)| *shown) {
         let fitness = Some(&condition.fitness);
         let metrics =
             names.iter().map(|name| condition.metrics.get(name).map(|metric| &metric.time_mean));

@@ -3,9 +3,11 @@
 //! reinforcement learning at the edge of the statistical precipice").
 
 mod bootstrap;
+mod kendall;
 mod ranks;
 
-pub use bootstrap::{Interval, interval, interval_of_two};
+pub use bootstrap::{Interval, interval, interval_of_crossed, interval_of_two};
+pub use kendall::{Kendall, kendall};
 pub use ranks::{mann_whitney, probability_of_improvement};
 
 /// The median; of an even number of values, the mean of the two middle values. NaN without values.

@@ -9,6 +9,25 @@ use super::*;
 struct Fixture {
     summaries: Vec<Summary>,
     pairs: Vec<Pair>,
+    orders: Vec<Orders>,
+    crossed: Vec<Crossed>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Orders {
+    a: Vec<f64>,
+    b: Vec<f64>,
+    tau: f64,
+    p: f64,
+}
+
+/// A table of n rows and m columns: the sum of effects of rows, of columns and of cells, with the
+/// 95 % interval of the mean, by numpy's resampling of rows and columns.
+#[derive(Debug, Deserialize)]
+struct Crossed {
+    rows: Vec<Vec<f64>>,
+    mean: f64,
+    ci95: [f64; 2],
 }
 
 #[derive(Debug, Deserialize)]
@@ -67,6 +86,34 @@ fn comparisons_agree_with_rliable_and_scipy() {
         assert!(close(p, pair.p, 1e-9), "{pair:?} {p}");
         assert_eq!(mann_whitney(&pair.b, &pair.a), Some(p));
     }
+}
+
+#[test]
+fn orders_agree_as_in_scipy() {
+    for of in fixture().orders {
+        let found = kendall(&of.a, &of.b).unwrap();
+        assert!(close(found.tau, of.tau, 1e-12) && close(found.p, of.p, 1e-9), "{of:?} {found:?}");
+        assert_eq!(kendall(&of.b, &of.a), Some(found));
+    }
+}
+
+#[test]
+fn without_an_order_there_is_no_tau() {
+    for (a, b) in [(vec![], vec![]), (vec![1.0], vec![2.0]), (vec![1.0, 2.0], vec![3.0, 3.0])] {
+        assert_eq!(kendall(&a, &b), None);
+    }
+    let two = kendall(&[1.0, 2.0], &[4.0, 3.0]).unwrap();
+    assert_eq!((two.tau, two.p), (-1.0, 1.0));
+}
+
+#[test]
+fn crossed_samples_have_the_interval_of_numpy() {
+    for of in fixture().crossed {
+        let found = interval_of_crossed(&of.rows);
+        assert!(close(found.value, of.mean, 1e-12) && agree(found, of.ci95, 0.06), "{found:?}");
+        assert_eq!(interval_of_crossed(&of.rows[..2]).ci95, None);
+    }
+    assert_eq!(interval_of_crossed(&vec![vec![2.0; 4]; 4]).ci95, Some([2.0; 2]));
 }
 
 #[test]

@@ -54,6 +54,14 @@ pub struct EvaluateArgs {
     /// wireless_receiver:msg or msg.
     #[arg(long, value_name = "STIMULUS,...", value_delimiter = ',')]
     pub inhibit: Vec<String>,
+    /// Add N conditions, each a world unlike the one of the design, and a condition per
+    /// cause; shows how much fitness they cost.
+    ///
+    /// The nominal condition is then the file without `pseudo_reality`. The numbers of each
+    /// reality come from the ranges of the file's own `pseudo_reality`, or from default
+    /// ranges; the seed of the file determines them.
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(3..=60))]
+    pub pseudo_realities: Option<u32>,
     #[command(flatten)]
     pub set: SetArg,
     /// Like --set with one value per path, but for all conditions, including the nominal
@@ -88,6 +96,7 @@ Examples:
   swarmctl evaluate 3@59/mean --data-dir swarm-data --local --to mean
   swarmctl evaluate 3 --robots 5,10,20,30,50 --to leader/scalability
   swarmctl evaluate 3 --perturb leader_failure:time_to_failure=50 --to leader/fault
+  swarmctl evaluate 3 --pseudo-realities 30 --to leader/realities
   swarmctl evaluate 3 --inhibit msg,receiving_direction,state --to leader/stimuli
   swarmctl evaluate 5 --steps 2000 --to light/path \\
       --set world.objects.light_red.controller=light_rnd_pos_controller

@@ -4,7 +4,7 @@ use experiment_file::{ConfigError, ExperimentConfig, suggestion};
 use indexmap::IndexMap;
 use sim_core::Simulation;
 
-use super::EvaluateArgs;
+use super::{EvaluateArgs, realities::Realities};
 use crate::{
     change::{Change, Json, apply_all, split},
     error::Error,
@@ -20,12 +20,24 @@ const CONDITIONS_MAX: usize = 64;
 pub struct Condition {
     /// Name for tables and legends.
     pub name: String,
+    pub role: Role,
     /// Changes relative to the nominal condition; those of the nominal condition are
     /// relative to the experiment file.
     pub changes: Vec<Change>,
     /// The experiment file, changed.
     pub config: ExperimentConfig,
     pub experiment: Simulation,
+}
+
+/// What a condition is there for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Itself.
+    Other,
+    /// One of the pseudo-realities.
+    Reality,
+    /// A range of this key of `pseudo_reality`, alone.
+    Key(&'static str),
 }
 
 impl Condition {
@@ -52,8 +64,11 @@ impl Condition {
     }
 }
 
-/// All conditions that the arguments request, the nominal one first.
-pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>, Error> {
+/// All conditions that the arguments request, the nominal one first, and the pseudo-realities.
+pub fn all(
+    file: &ExperimentFile,
+    args: &EvaluateArgs,
+) -> Result<(Vec<Condition>, Option<Realities>), Error> {
     let overrides = Overrides { steps: args.steps.steps, ..Overrides::default() };
     let compiled = file.compile(&overrides).map_err(|error| file.invalid(&error))?;
     let mut base = to_json(&compiled.config);
@@ -63,7 +78,18 @@ pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>,
     }
     apply_all(&base_changes, &mut base)
         .map_err(|problems| Error::Input(format!("--base {}", problems.join("; "))))?;
-    let nominal = Nominal { config: read("--base", &base)?, base };
+    let mut config = read("--base", &base)?;
+    let realities = args.pseudo_realities.map(|n| Realities::draw(&config, n)).transpose()?;
+    if realities.is_some() {
+        let robots = config.algorithm.evolvable_object.clone();
+        let path = ["world", "objects", &robots, "perturbations"];
+        if base.get_mut(path).is_some_and(|it| it.remove("pseudo_reality")) {
+            let path = format!("{}.pseudo_reality", path.join("."));
+            base_changes.push(Change::new(path, Json::Scalar(serde_json::Value::Null)));
+            config = read("--base", &base)?;
+        }
+    }
+    let nominal = Nominal { config, base };
     let unchanged = nominal.condition("nominal".into(), Vec::new())?;
     let mut conditions = vec![Condition { changes: base_changes, ..unchanged }];
     for &n in &args.robots {
@@ -79,15 +105,21 @@ pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>,
     for text in &args.set.set {
         conditions.extend(nominal.conditions(text)?);
     }
+    for (name, role, reality) in realities.iter().flat_map(Realities::conditions) {
+        let change = Change::new(nominal.place("perturbations.pseudo_reality"), reality);
+        conditions.push(Condition { role, ..nominal.condition(name, vec![change])? });
+    }
     if conditions.len() > CONDITIONS_MAX {
-        return Err(Error::Input(format!("at most {CONDITIONS_MAX} conditions at once")));
+        let n = conditions.len();
+        let problem = format!("at most {CONDITIONS_MAX} conditions at once; these are {n}");
+        return Err(Error::Input(problem));
     }
     for (index, condition) in conditions.iter().enumerate() {
         if conditions[..index].iter().any(|other| other.name == condition.name) {
             return Err(Error::Input(format!("condition {} is given twice", condition.name)));
         }
     }
-    Ok(conditions)
+    Ok((conditions, realities))
 }
 
 /// The nominal condition, from which the others are made.
@@ -103,7 +135,7 @@ impl Nominal {
         apply_all(&changes, &mut file).map_err(|problems| input(problems.join("; ")))?;
         let config = read(&format!("condition {name}"), &file)?;
         let experiment = Simulation::compile(&config).map_err(|error| input(problems(&error)))?;
-        Ok(Condition { name, changes, config, experiment })
+        Ok(Condition { name, role: Role::Other, changes, config, experiment })
     }
 
     /// The conditions of one `--set`: one for each combination of its values.

@@ -12,6 +12,7 @@ use evolution::Digest;
 use super::{
     conditions::Condition,
     measured::Measured,
+    realities::Robustness,
     statistics::{Estimate, mean},
 };
 
@@ -60,6 +61,8 @@ pub struct Summary {
     #[serde(flatten)]
     subject: Subject,
     pub conditions: Vec<ConditionSummary>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pseudo_realities: Option<Robustness>,
 }
 
 /// The results of one condition.
@@ -105,7 +108,13 @@ impl Summary {
                 metrics: metrics(measured),
             }
         });
-        Self { subject: subject.clone(), conditions: conditions.collect() }
+        let conditions = conditions.collect();
+        Self { subject: subject.clone(), conditions, pseudo_realities: None }
+    }
+
+    /// The same with what pseudo-realities cost.
+    pub fn with(self, pseudo_realities: Option<Robustness>) -> Self {
+        Self { pseudo_realities, ..self }
     }
 
     /// All measures of all conditions.

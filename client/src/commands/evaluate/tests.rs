@@ -23,6 +23,7 @@ fn args() -> EvaluateArgs {
         robots: Vec::new(),
         perturb: Vec::new(),
         inhibit: Vec::new(),
+        pseudo_realities: None,
         set: SetArg::default(),
         base: Vec::new(),
         every: 1,
@@ -36,7 +37,8 @@ fn args() -> EvaluateArgs {
 }
 
 fn conditions(config: &str, args: &EvaluateArgs) -> Result<Vec<Condition>, Error> {
-    conditions::all(&ExperimentFile::read(&shipped(config)).unwrap(), args)
+    let file = ExperimentFile::read(&shipped(config)).unwrap();
+    conditions::all(&file, args).map(|(conditions, _)| conditions)
 }
 
 /// The robots of the light follower, or of another experiment of the same name.
@@ -214,4 +216,45 @@ fn each_value_of_an_option_makes_a_condition() {
     let names: Vec<&str> = conditions.iter().map(|condition| &*condition.name).collect();
     let both = ["world.height=1000; seed=7", "world.height=2000; seed=7"];
     assert_eq!(names, ["nominal", both[0], both[1], "seed=8"]);
+}
+
+#[test]
+fn pseudo_realities_follow_other_conditions_and_each_range_comes_alone() {
+    let args = EvaluateArgs { pseudo_realities: Some(3), robots: vec![5], ..args() };
+    let found = conditions("leader_selection_snes", &args).unwrap();
+    let names: Vec<&str> = found.iter().map(|condition| &*condition.name).collect();
+    let expected = [
+        "nominal",
+        "robots=5",
+        "reality 0",
+        "reality 1",
+        "reality 2",
+        "only actuation_delay",
+        "only radio_range",
+        "only radio_loss",
+        "only antenna_heading",
+    ];
+    assert_eq!(names, expected);
+    let reality = |index: usize| robots(&found[index])["perturbations"]["pseudo_reality"].clone();
+    assert_eq!(reality(0), Value::Null);
+    assert_eq!(reality(7)["radio_loss"], json!([0.0, 0.6]));
+    assert_eq!(reality(7)["radio_range"], json!(1.0));
+    assert_ne!(reality(2), reality(3));
+    let args = EvaluateArgs { pseudo_realities: Some(60), ..args };
+    let error = conditions("leader_selection_snes", &args).unwrap_err();
+    assert_eq!(error.to_string(), "at most 64 conditions at once; these are 66");
+}
+
+#[test]
+fn the_ranges_of_the_file_replace_the_default_ones_and_the_nominal_condition_has_none() {
+    let reality = "world.objects.robotA.perturbations.pseudo_reality";
+    let ranges = r#"{"radio_loss": [0.2, 0.4], "actuation_delay": 1}"#;
+    let base = strings(&[&format!("{reality}={ranges}")]);
+    let args = EvaluateArgs { pseudo_realities: Some(3), base, ..args() };
+    let found = conditions("leader_selection_snes", &args).unwrap();
+    let names: Vec<&str> = found[4..].iter().map(|condition| &*condition.name).collect();
+    assert_eq!(names, ["only actuation_delay", "only radio_loss"]);
+    let plain = conditions("leader_selection_snes", &self::args()).unwrap();
+    assert_eq!(found[0].config.to_canonical_json(), plain[0].config.to_canonical_json());
+    assert_eq!(found[0].changes.last().unwrap().path, reality);
 }
