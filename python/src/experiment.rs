@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use controller_c::About;
+use controller_c::{About, Episodes as Recorded, LEN_MAX};
 use evolution::{ALGORITHMS, Digest};
 use experiment_file::{ExperimentConfig, ScriptConfig};
 use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
@@ -162,19 +162,28 @@ impl Experiment {
         genotype: PyReadonlyArray1<'py, f64>,
         trials: Trials,
     ) -> PyResult<Vec<(&'static str, Bound<'py, PyBytes>)>> {
-        let (genotype, trial_set) = (genotype.to_vec()?, trials.set()?);
-        let about = About {
-            experiment: self.config.name.clone(),
-            genotype: "a genotype of Python".into(),
-            config_digest: self.config_digest(),
-        };
+        let (genotype, trial_set, about) = (genotype.to_vec()?, trials.set()?, self.about());
         let simulation = &self.simulation;
-        let export =
-            || controller_c::export(simulation, &genotype, trial_set, trials.range(), &about);
-        let controller = guarded(py, export)?;
+        let controller = guarded(py, || {
+            let (trials, keep_going) = (trials.range(), &|| true);
+            let episodes = Recorded { trial_set, trials, len_max: LEN_MAX, keep_going };
+            controller_c::export(simulation, &genotype, episodes, &about)
+        })?;
         let controller = controller.map_err(|error| PyValueError::new_err(error.to_string()))?;
         let files = controller.files.iter();
         Ok(files.map(|(name, content)| (*name, PyBytes::new(py, content))).collect())
+    }
+
+    /// The controller of a genotype as a graph of ONNX.
+    fn controller_onnx<'py>(
+        &self,
+        py: Python<'py>,
+        genotype: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let (genotype, about, simulation) = (genotype.to_vec()?, self.about(), &self.simulation);
+        let graph = guarded(py, || controller_onnx::export(simulation, &genotype, &about))?;
+        let graph = graph.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(PyBytes::new(py, &graph))
     }
 
     /// The player with an episode, as an HTML file.
@@ -208,6 +217,15 @@ impl Experiment {
 }
 
 impl Experiment {
+    /// Where a controller of Python comes from.
+    fn about(&self) -> About {
+        About {
+            experiment: self.config.name.clone(),
+            genotype: "a genotype of Python".into(),
+            config_digest: self.config_digest(),
+        }
+    }
+
     pub fn config(&self) -> &ExperimentConfig {
         &self.config
     }

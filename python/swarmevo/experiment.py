@@ -259,6 +259,9 @@ class Experiment:
     ) -> list[tuple[str, bytes]]:
         return self._core.controller_c(genes, address(generation, trials, self.n_trials))
 
+    def _controller_onnx(self, genes: Floats) -> bytes:
+        return self._core.controller_onnx(genes)
+
     def replace(
         self,
         *,

@@ -79,15 +79,29 @@ class Network:
         """Writes the controller with its radio as C99, with T recorded trials: ``make test`` in the
         directory compares every bit with them. Replaces existing files, and returns all paths. As
         ``swarmctl export-controller``, for networks of :meth:`Experiment.network`."""
-        if self._origin is None:
-            raise ValueError("this network is only a description; to_c needs one of experiment.network(genotype)")
-        experiment, genes = self._origin
+        experiment, genes = self._found("to_c")
         files = experiment._controller_c(genes, generation, trials)
         directory = Path(directory)
         directory.mkdir(parents=True, exist_ok=True)
         for name, content in files:
             (directory / name).write_bytes(content)
         return [directory / name for name, _ in files]
+
+    def to_onnx(self, path: str | os.PathLike[str]) -> Path:
+        """Writes one step of the controller as a graph of ONNX, for R robots at once: from ``stimulus_NAME``
+        ``[R, n]`` and ``state`` to ``activities`` ``[R, N]``, ``next_state`` and what the robots do. Leave ``state``
+        out in the first step. Replaces an existing file, and returns its path. Raises :class:`ValueError` for
+        spiking and for plastic networks. As ``swarmctl export-controller --language onnx``, for networks of
+        :meth:`Experiment.network`."""
+        experiment, genes = self._found("to_onnx")
+        path = Path(path)
+        path.write_bytes(experiment._controller_onnx(genes))
+        return path
+
+    def _found(self, method: str) -> tuple[Experiment, NDArray[np.float64]]:
+        if self._origin is None:
+            raise ValueError(f"this network is only a description; {method} needs one of experiment.network(genotype)")
+        return self._origin
 
     def to_networkx(self) -> networkx.MultiDiGraph:
         """A graph with a node per input, node of an encoder and neuron, under their names, and an

@@ -31,6 +31,15 @@ def test_pyribs_maps_light_followers(tmp_path):
     assert "kinds" in out and figure.stat().st_size > 1000
 
 
+@pytest.mark.parametrize(("task", "least"), [("gather", 0.85), ("transport", 0.5)])
+def test_champions_drive_robots_of_pymunk(task, least):
+    pytest.importorskip("pymunk")
+    out = run("robots_in_pymunk.py", task, "--trials", 3)
+    means = {line.split()[0]: float(line.split()[1]) for line in out.splitlines()}
+    assert list(means) == ["swarmevo", "pymunk", "difference"]
+    assert means["pymunk"] > least, out
+
+
 def test_seeds_are_compared(tmp_path):
     figure = tmp_path / "comparison.png"
     out = run("compare_seeds.py", "--seeds", 2, "--generations", 2, "--to", figure)

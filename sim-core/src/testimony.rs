@@ -1,7 +1,7 @@
 //! Testimonies: what a robot perceived, drew, decided and sent in a step, so that the same
 //! controller outside of this program can prove to do the same.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use crate::communication::FrameOrigin;
 use crate::episode;
@@ -102,7 +102,7 @@ impl Simulation {
     }
 
     /// Simulates the episode of one trial, and shows what each robot of the evolvable object
-    /// perceived and did, step by step and robot by robot. The episode has the same bits as in
+    /// perceived and did, step by step and robot by robot, until the observer breaks off. The episode has the same bits as in
     /// [`simulate`](Self::simulate); a decision is the network's own, before any perturbation.
     ///
     /// # Errors
@@ -113,7 +113,7 @@ impl Simulation {
         genotype: &[f64],
         trial_set: impl Into<TrialSet>,
         trial: u32,
-        observe: &mut dyn FnMut(&Testimony),
+        observe: &mut dyn FnMut(&Testimony) -> ControlFlow<()>,
     ) -> Result<(), EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
         let trials: Range<u32> = trial..trial.saturating_add(1);
@@ -164,9 +164,17 @@ mod tests {
                 let message = if radio.sends { &robot.message } else { &robot.received_message };
                 assert_eq!(&sent.message, message);
                 n_overruled += u32::from(radio.sends != testimony.sends);
+                ControlFlow::Continue(())
             };
             simulation.testify(&genotype, 4, 1, &mut check).unwrap();
             assert_eq!(n_testimonies, records.len() * simulation.witnesses().len());
+            let mut n_more = 3;
+            let mut break_off = |_: &Testimony| {
+                n_more -= 1;
+                if n_more == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            simulation.testify(&genotype, 4, 1, &mut break_off).unwrap();
+            assert_eq!(n_more, 0);
         }
         assert!(n_overruled > 0, "the first steps overrule no decision");
     }

@@ -1,9 +1,9 @@
-//! `swarmctl export-controller`: an evolved controller as C, with a proof.
+//! `swarmctl export-controller`: an evolved controller as C, with a proof, or as a graph of ONNX.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use controller_c::{About, Controller, NAMES};
+use controller_c::{About, Controller, Episodes, LEN_MAX};
 use evolution::Digest;
 use experiment_file::limits;
 use serde::Serialize;
@@ -23,12 +23,15 @@ use crate::{
 
 /// Write a controller as C99 for a robot, with a test that compares every bit.
 ///
-/// The directory gets controller.h and controller.c, the network of one robot without heap,
+/// In C, the directory gets controller.h and controller.c, the network of one robot without heap,
 /// globals, and functions of libm other than fmaf; swarm_radio.h and swarm_radio.c, which choose
 /// the received frame and what is sent; recorded episodes, and test.c, which compares all stimuli,
 /// decisions, activities and frames of every robot with them; a Makefile and a README.md. `make
 /// test` proves that the compiled controller computes the bits of the simulation, here or on
 /// another processor.
+///
+/// In ONNX, it gets controller.onnx, one step of any number of robots: from their stimuli and
+/// state to what they do and their next state. Runtimes round otherwise than the simulation.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ExportControllerArgs {
@@ -56,6 +59,18 @@ pub struct ExportControllerArgs {
 enum Language {
     /// C99
     C,
+    /// A graph of ONNX, of rate neurons; without recorded episodes
+    Onnx,
+}
+
+impl Language {
+    /// The names of all files that a controller may have.
+    fn names(self) -> &'static [&'static str] {
+        match self {
+            Self::C => &controller_c::NAMES,
+            Self::Onnx => &[controller_onnx::NAME],
+        }
+    }
 }
 
 const HELP: &str = "\
@@ -63,6 +78,7 @@ Examples:
   swarmctl export-controller 3 --language c --to robot && make -C robot test
   swarmctl export-controller 3@5/7 --to robot --trials 20
   swarmctl export-controller --config experiment.json --genotype champion.json --to robot
+  swarmctl export-controller 3 --language onnx --to robot
   make -C robot clean test CC=aarch64-linux-gnu-gcc RUN=qemu-aarch64-static CFLAGS=-static";
 
 /// A written controller.
@@ -82,8 +98,12 @@ pub async fn export_controller(
     args: &ExportControllerArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    args.overwrite.check_files(&args.to, &NAMES)?;
-    let Language::C = args.language;
+    args.overwrite.check_files(&args.to, args.language.names())?;
+    if args.language == Language::Onnx && (args.trials > 1 || args.generation.is_some()) {
+        let why =
+            "a controller in ONNX has no recorded episodes; leave out --trials and --generation";
+        return Err(Error::Input(why.into()));
+    }
     let Subject { file, genotype, generation, .. } = args.subject.find(settings, progress).await?;
     let Compiled { config, experiment: simulation, .. } =
         file.compile(&Overrides::default()).map_err(|error| file.invalid(&error))?;
@@ -92,13 +112,28 @@ pub async fn export_controller(
         genotype: args.subject.title(&genotype),
         config_digest: Digest::of_config(&config, FINGERPRINT).to_string(),
     };
-    let output = args.overwrite.begin_files(&args.to, &NAMES)?;
+    let output = args.overwrite.begin_files(&args.to, args.language.names())?;
+    let genes = &genotype.genes;
     let trial_set = TrialSet::Generation(args.generation.unwrap_or(generation));
-    let controller = waiting::busy("recording the episodes; --trials reduces their number", || {
-        controller_c::export(&simulation, &genotype.genes, trial_set, 0..args.trials, &about)
-    });
-    let Controller { files, robot_steps } =
-        controller.map_err(|error| Error::Input(format!("{genotype}: {error}")))?;
+    let unfit = |error: &dyn std::fmt::Display| Error::Input(format!("{genotype}: {error}"));
+    let Controller { files, robot_steps } = match args.language {
+        Language::C => {
+            let episodes = Episodes {
+                trial_set,
+                trials: 0..args.trials,
+                len_max: LEN_MAX,
+                keep_going: &|| true,
+            };
+            let record = || controller_c::export(&simulation, genes, episodes, &about);
+            waiting::busy("recording the episodes; --trials reduces their number", record)
+                .map_err(|error| unfit(&error))?
+        }
+        Language::Onnx => {
+            let graph = controller_onnx::export(&simulation, genes, &about);
+            let graph = graph.map_err(|error| unfit(&error))?;
+            Controller { files: vec![(controller_onnx::NAME, graph)], robot_steps: 0 }
+        }
+    };
     for (name, content) in &files {
         output.write(name, content)?;
     }
@@ -115,6 +150,8 @@ pub async fn export_controller(
             files,
             robot_steps,
         })
+    } else if args.language == Language::Onnx {
+        format!("{genotype}: {} in {directory}", controller_onnx::NAME)
     } else {
         format!(
             "{genotype}: {} files in {directory}, with {robot_steps} recorded robot-steps\n\

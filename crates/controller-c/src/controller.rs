@@ -39,6 +39,9 @@ pub fn text(blueprint: &Blueprint, names: &Names) -> String {
             .to_owned(),
     );
     parts.push(step(blueprint, names, has_inputs));
+    parts.push(
+        "uint32_t swarm_size(void)\n{\n    return (uint32_t)sizeof(swarm_t);\n}\n".to_owned(),
+    );
     parts.join("\n")
 }
 

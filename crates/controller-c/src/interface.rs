@@ -62,7 +62,9 @@ pub fn header(blueprint: &Blueprint, names: &Names, about: &About) -> String {
              void swarm_init(swarm_t *swarm);\n\n\
              /* One step: perceives, and decides. */\n\
              void swarm_step(swarm_t *swarm, const swarm_stimuli_t *stimuli, \
-             swarm_actions_t *actions);\n\n";
+             swarm_actions_t *actions);\n\n\
+             /* Bytes of a swarm_t, for callers in other languages. */\n\
+             uint32_t swarm_size(void);\n\n";
     text += match &blueprint.neurons {
         Neurons::Rate(_) => "/* Activity of a neuron, from 0. */\n",
         Neurons::Spiking(_) => {

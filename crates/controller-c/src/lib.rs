@@ -23,7 +23,7 @@ mod spiking;
 mod trial;
 mod vectors;
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use experiment_file::ActuatorQuery;
 use sim_core::blueprint::{Blueprint, Decoder, Neurons};
@@ -62,7 +62,31 @@ pub enum ExportError {
     /// The genotype does not fit, or an episode cannot be simulated.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
+    /// The recorded episodes are too long.
+    #[error("its recorded episodes would have more than {} MB", len_max / 1_000_000)]
+    TooLong {
+        /// Their largest size, bytes.
+        len_max: usize,
+    },
+    /// The caller does not want it any more.
+    #[error("it was stopped")]
+    Stopped,
 }
+
+/// The episodes to record.
+pub struct Episodes<'a> {
+    /// Their trial set.
+    pub trial_set: TrialSet,
+    /// Their trials.
+    pub trials: Range<u32>,
+    /// Largest size of the records together, bytes.
+    pub len_max: usize,
+    /// Whether to continue.
+    pub keep_going: &'a dyn Fn() -> bool,
+}
+
+/// A size of records that fits the memory of most machines, bytes.
+pub const LEN_MAX: usize = 2_000_000_000;
 
 /// Name of the file with recorded episodes.
 const VECTORS: &str = "test_vectors.bin";
@@ -79,23 +103,34 @@ pub const NAMES: [&str; 8] = [
     VECTORS,
 ];
 
-/// The controller that a genotype encodes, with the episodes of trials of a set.
+/// The controller that a genotype encodes, with recorded episodes.
 ///
 /// # Errors
 ///
-/// If the evolvable robots have no network, or if an episode cannot be simulated.
+/// If the evolvable robots have no network, if an episode cannot be simulated or is too long, or if
+/// `keep_going` of the episodes returns false.
 pub fn export(
     simulation: &Simulation,
     genotype: &[f64],
-    trial_set: TrialSet,
-    trials: Range<u32>,
+    episodes: Episodes<'_>,
     about: &About,
 ) -> Result<Controller, ExportError> {
     let blueprint = simulation.blueprint(genotype)?.ok_or(ExportError::NoNetwork)?;
+    let Episodes { trial_set, trials, len_max, keep_going } = episodes;
     let mut vectors = Vectors::new(&blueprint, &simulation.witnesses(), simulation.n_steps());
-    let mut add = |testimony: &_| vectors.add(testimony);
     for trial in trials.clone() {
+        let mut refusal = None;
+        let mut add = |testimony: &_| {
+            vectors.add(testimony);
+            refusal = if vectors.n_bytes() > len_max {
+                Some(ExportError::TooLong { len_max })
+            } else {
+                (!keep_going()).then_some(ExportError::Stopped)
+            };
+            if refusal.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
         simulation.testify(genotype, trial_set, trial, &mut add)?;
+        refusal.map_or(Ok(()), Err)?;
     }
     let episodes = match trials.len() {
         1 => format!("trial {} of {trial_set}", trials.start),

@@ -101,6 +101,11 @@ impl Vectors {
         self.n_records
     }
 
+    /// Bytes so far.
+    pub fn n_bytes(&self) -> usize {
+        self.bytes.len()
+    }
+
     /// The content of the file.
     pub fn finish(mut self) -> Vec<u8> {
         self.bytes[N_RECORDS].copy_from_slice(&self.n_records.to_le_bytes());

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use controller_c::{About, Controller, ExportError};
+use controller_c::{About, Controller, Episodes, ExportError, LEN_MAX};
 use experiment_file::{ExperimentConfig, ScriptConfig, inline_script, script_path};
 use serde_json::{Value, json};
 use sim_core::{Simulation, TrialSet};
@@ -67,13 +67,25 @@ fn spiking(model: &str, change: impl FnOnce(&mut Value)) -> (ExperimentConfig, V
 
 /// The controller of a genotype, with one recorded episode.
 fn exported(config: &ExperimentConfig, genotype: &[f64]) -> Result<Controller, ExportError> {
+    exported_while(config, genotype, LEN_MAX, &|| true)
+}
+
+/// The same within limits.
+fn exported_while(
+    config: &ExperimentConfig,
+    genotype: &[f64],
+    len_max: usize,
+    keep_going: &dyn Fn() -> bool,
+) -> Result<Controller, ExportError> {
     let simulation = Simulation::compile(config).unwrap();
     let about = About {
         experiment: config.name.clone(),
         genotype: "a genotype".into(),
         config_digest: "none".into(),
     };
-    controller_c::export(&simulation, genotype, TrialSet::Generation(1), 0..1, &about)
+    let trial_set = TrialSet::Generation(1);
+    let episodes = Episodes { trial_set, trials: 0..1, len_max, keep_going };
+    controller_c::export(&simulation, genotype, episodes, &about)
 }
 
 /// Writes a controller and its test vectors.

@@ -1,5 +1,7 @@
 //! Simulates one trial, and testifies what each robot perceived and did.
 
+use std::ops::ControlFlow;
+
 use super::{Episodes, GroupController};
 use crate::communication::Mode;
 use crate::controllers::Action;
@@ -22,13 +24,13 @@ struct Witness {
 }
 
 /// Simulates the episode of one trial, and shows what each robot of the evolvable object perceived
-/// and did.
+/// and did, until the observer breaks off.
 pub(crate) fn testify(
     simulation: &Simulation,
     phenotype: &Phenotype,
     trial_set: TrialSet,
     trial: u32,
-    observe: &mut dyn FnMut(&Testimony),
+    observe: &mut dyn FnMut(&Testimony) -> ControlFlow<()>,
 ) -> Result<(), EvaluateError> {
     let (group, trials) = (simulation.world.evolvable, trial..trial + 1);
     let mut episodes = Episodes::new(simulation, phenotype, trial_set, trials, &|| true)?;
@@ -51,7 +53,9 @@ pub(crate) fn testify(
         episodes.trials[0].act(step)?;
         for witness in &mut witnesses {
             episodes.trials[0].send(witness.robot, &mut witness.testimony.radio);
-            observe(&witness.testimony);
+            if observe(&witness.testimony).is_break() {
+                return Ok(());
+            }
         }
         episodes.trials[0].move_things(step)?;
     }
