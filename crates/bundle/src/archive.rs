@@ -49,26 +49,14 @@ impl Bundle {
     pub fn to_bytes(&self) -> Result<Vec<u8>, BundleError> {
         let files = self.to_files();
         let description = description::describe(self, &files);
-        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-        let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Deflated)
-            .last_modified_time(DateTime::default());
-        let mut put = |name: &str, content: &[u8]| {
-            archive.start_file(name, options)?;
-            archive.write_all(content)?;
-            Ok::<_, zip::result::ZipError>(())
-        };
-        let unwritable = |error: zip::result::ZipError| BundleError::Archive(error.to_string());
-        put(DESCRIPTION, description.as_bytes()).map_err(unwritable)?;
-        let mut n_bytes = description.len() as u64;
-        for file in &files {
-            n_bytes += file.content.len() as u64;
-            put(file.name, &file.content).map_err(unwritable)?;
-        }
-        if n_bytes > UNPACKED_LEN_MAX {
+        let described = (DESCRIPTION, description.as_bytes());
+        let contents = files.iter().map(|file| (file.name, &*file.content));
+        let contents = std::iter::once(described).chain(contents);
+        if contents.clone().map(|(_, content)| content.len() as u64).sum::<u64>() > UNPACKED_LEN_MAX
+        {
             return Err(BundleError::UnpackedTooLong);
         }
-        let bytes = archive.finish().map_err(unwritable)?.into_inner();
+        let bytes = pack(contents)?;
         check_len(bytes.len() as u64)?;
         Ok(bytes)
     }
@@ -99,6 +87,30 @@ impl Bundle {
         description::check(&description, &files)?;
         Self::from_files(files)
     }
+}
+
+/// Files as a ZIP archive; the same files always become the same bytes.
+///
+/// # Errors
+///
+/// If there is a name twice.
+pub fn pack<'a>(
+    files: impl IntoIterator<Item = (&'a str, &'a [u8])>,
+) -> Result<Vec<u8>, BundleError> {
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default());
+    let mut put = |name: &str, content: &[u8]| {
+        archive.start_file(name, options)?;
+        archive.write_all(content)?;
+        Ok::<_, zip::result::ZipError>(())
+    };
+    let unwritable = |error: zip::result::ZipError| BundleError::Archive(error.to_string());
+    for (name, content) in files {
+        put(name, content).map_err(unwritable)?;
+    }
+    Ok(archive.finish().map_err(unwritable)?.into_inner())
 }
 
 /// Checks the length of a bundle.

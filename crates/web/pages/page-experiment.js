@@ -2,6 +2,7 @@
 
 import { decimals, element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
+import { controllerButton } from "swarm/controller.js";
 import { whatItDoes } from "swarm/doing.js";
 import { dynamicsPanel } from "swarm/dynamics.js";
 import { familiesPanel } from "swarm/families.js";
@@ -147,7 +148,13 @@ function drawActions() {
   if (held) (document.getElementById(held) ?? buttons[0])?.focus();
 }
 
+let drawnChampion = "";
+
+/** Shows the champion when it changes, so that focus and clicks survive. */
 function drawChampion() {
+  const due = JSON.stringify([champion, experiment.generations_done, experiment.digest, experiment.simulation]);
+  if (due === drawnChampion) return;
+  drawnChampion = due;
   const play = (address, text) => element("a", { className: "play", href: `/replay/${address}` }, `▶ ${text}`);
   const done = experiment.generations_done;
   const parts = [element("h2", {}, "Champion")];
@@ -159,7 +166,7 @@ function drawChampion() {
       : "not judged yet", champion.judged ? ` on ${trials} new trials` : ""));
     if (champion.selection !== null) parts.push(element("p", { className: "muted" }, `${decimals(champion.selection, 4)} on the trials that selected it, which is optimistic`));
     parts.push(element("p", { className: "muted" }, `${who} of generation ${champion.generation}`));
-    parts.push(element("p", { className: "row" }, play(id, "champion"), play(`${id}@0/0`, "first generation"), play(`${id}@${done - 1}/0`, "last generation")));
+    parts.push(element("p", { className: "row" }, play(id, "champion"), play(`${id}@0/0`, "first generation"), play(`${id}@${done - 1}/0`, "last generation"), controllerButton(id)));
   } else {
     parts.push(element("p", { className: "muted" }, "none before the first generation is complete"));
   }

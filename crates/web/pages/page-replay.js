@@ -1,6 +1,7 @@
 // Any individual, simulated when the page opens; and a changed simulation beside it.
 
 import { element } from "swarm/dom.js";
+import { controllerButton } from "swarm/controller.js";
 import { unpack } from "swarm/episode.js";
 import { ask, askJson, bar, complain, main, resolve } from "swarm/page.js";
 import { NOWHERE, Player, heading, readAddress } from "swarm/player.js";
@@ -12,7 +13,8 @@ const [id, at] = address.split("@");
 const where = `${encodeURIComponent(id)}${at ? `@${at}` : ""}`;
 bar(`Replay ${address}`, "");
 
-const neighbours = element("p", { className: "row" }, element("a", { href: `/experiment/${id}` }, `experiment ${id}`));
+const exportButton = controllerButton(where);
+const neighbours = element("p", { className: "row" }, element("a", { href: `/experiment/${id}` }, `experiment ${id}`), exportButton);
 const loading = element("p", { className: "loading muted", role: "status" });
 const stage = element("div", { className: "replays" });
 const strip = element("div");
@@ -24,7 +26,7 @@ function drawNeighbours({ population_size: n_individuals, generations_done: n_ge
   if (!at?.includes("/") || at.endsWith("mean")) return;
   const [generation, individual] = at.split("/").map(Number);
   const link = (g, i, text) => (g >= 0 && g < n_generations && i >= 0 && i < n_individuals ? [element("a", { href: `/replay/${id}@${g}/${i}` }, text)] : []);
-  neighbours.append(
+  exportButton.before(
     ...link(generation, individual - 1, "‹ individual"), ...link(generation, individual + 1, "individual ›"),
     ...link(generation - 1, individual, "‹ generation"), ...link(generation + 1, individual, "generation ›"),
     element("a", { href: `/replay/${id}` }, "champion"));

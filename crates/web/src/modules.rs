@@ -22,6 +22,7 @@ modules!(
     "camera.js",
     "clock.js",
     "comparison.js",
+    "controller.js",
     "dom.js",
     "doing.js",
     "drawing.js",

@@ -1,5 +1,6 @@
 """The player in a real browser, in all its forms; called like `browser.py`."""
 
+import base64
 import csv
 import io
 import json
@@ -10,6 +11,7 @@ import tempfile
 import unittest
 import urllib.request
 import xml.etree.ElementTree
+import zipfile
 
 from harness import CONFIG, NARROW, PROGRAMS, BrowserTest, Fleet
 
@@ -117,6 +119,65 @@ class Replays(BrowserTest):
         # The first bytes of Matroska files, which include WebM files.
         self.assertEqual(self.script("return [...new Uint8Array(saved, 0, 4)]"), [0x1A, 0x45, 0xDF, 0xA3])
         self.assertEqual(self.text("#record"), "● video")
+
+    def saved_controller(self, path):
+        """Presses the button; the names in the archive, and what the test among them says."""
+        self.open(path)
+        self.find(".controller")
+        packed = self.browser.execute_async_script("""
+            const done = arguments[0];
+            const make = URL.createObjectURL;
+            URL.createObjectURL = (blob) => {
+                const reader = new FileReader();
+                reader.onload = () => done(reader.result.split(",")[1]);
+                reader.readAsDataURL(blob);
+                return make(blob);
+            };
+            HTMLAnchorElement.prototype.click = function () { window.savedAs = this.download; };
+            document.querySelector(".controller").click();
+        """)
+        with tempfile.TemporaryDirectory() as directory, zipfile.ZipFile(io.BytesIO(base64.b64decode(packed))) as archive:
+            archive.extractall(directory)
+            folder = pathlib.Path(directory) / self.script("return savedAs").removesuffix(".zip")
+            made = subprocess.run(["make", "-s", "-C", folder, "test"], text=True, capture_output=True)
+            return sorted(it.name for it in folder.iterdir() if it.suffix in (".c", ".h")), made.stdout
+
+    def test_a_controller_that_is_saved_computes_the_same_bits(self):
+        files = ["controller.c", "controller.h", "swarm_radio.c", "swarm_radio.h", "test.c"]
+        for name, path in [("champion", "/experiment/1"), ("individual", "/replay/1@2/3#step=0")]:
+            self.assertEqual(self.saved_controller(path), (files, "500 robot-steps, 0 bits differ\n"))
+            self.assertTrue(self.script("return !document.querySelector('.controller').disabled && !document.querySelector('#problem')"))
+            # On a phone, a usual screen and a wide one.
+            for width in (NARROW, 1280, 2560):
+                size = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": width == NARROW}
+                self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+                self.assertLessEqual(self.width(), width)
+                self.script("document.querySelector('.controller').scrollIntoView({ block: 'center' })")
+                self.picture(f"controller-{name}-{width}")
+            self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+    def test_pages_of_a_data_directory_save_controllers_and_say_why_not(self):
+        script = "def control(robot):\n    robot.led = True\n\ndef fitness(world):\n    return 1\n"
+        config = json.loads(CONFIG.read_text())
+        config["world"]["objects"]["robot"]["controller"] = "script_controller"
+        config["task"] = {"script": {"name": "control.star", "text": script}}
+        del config["algorithm"]["fitness_function"]
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        file, data = (pathlib.Path(directory.name) / name for name in ("scripted.json", "data"))
+        file.write_text(json.dumps(config))
+        for it in (CONFIG, file):
+            command = [PROGRAMS / "swarmctl", "run", it, "--generations", "1", "--data-dir", data]
+            subprocess.run(command, check=True, capture_output=True)
+        pages = subprocess.Popen([PROGRAMS / "swarmctl", "web", "--data-dir", data], stdout=subprocess.PIPE, text=True)
+        self.addCleanup(lambda: (pages.kill(), pages.wait(), pages.stdout.close()))
+        self.browser.get(pages.stdout.readline().strip())
+        self.find("tr[data-id='2'] a").click()
+        self.find(".controller").click()
+        self.wait_for_text("#problem", "its robots have no network")
+        asked = "return fetch('/api/controller/1').then((it) => [it.status, it.headers.get('content-disposition')])"
+        self.assertEqual(self.script(asked), [200, 'attachment; filename="controller-1.zip"'])
+        self.expected_complaints = ("/api/controller/2",)
 
     def test_only_existing_neighbours_have_links(self):
         self.open("/replay/1@0/0#step=1")

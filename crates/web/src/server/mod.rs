@@ -6,6 +6,7 @@ mod answers;
 mod assets;
 mod compare;
 mod compression;
+mod controllers;
 mod experiments;
 mod fleet;
 mod limits;
@@ -139,6 +140,7 @@ impl Site {
             .route("/experiments/{id}/{action}", post(fleet::steer))
             .route("/replay/{*address}", get(replays::replay))
             .route("/trials/{*address}", get(replays::trials))
+            .route("/controller/{*address}", get(controllers::controller))
             .fallback(Problem::nowhere)
             .method_not_allowed_fallback(Problem::nowhere)
             .layer(middleware::from_fn(compression::compress))

@@ -46,15 +46,17 @@ impl Judgements {
 
 /// A genotype that can be simulated again.
 #[derive(Clone)]
-struct Subject {
+pub struct Subject {
     experiment: u64,
     config_json: String,
-    individual: GetChampionResponse,
-    name: String,
+    /// The genotype and its fitness.
+    pub individual: GetChampionResponse,
+    /// Its name for people.
+    pub name: String,
 }
 
 impl Subject {
-    async fn find(shared: &Shared, address: &str) -> Result<Self, Problem> {
+    pub async fn find(shared: &Shared, address: &str) -> Result<Self, Problem> {
         let experiment = address.split('@').next().and_then(|id| id.parse().ok());
         let experiment =
             experiment.ok_or_else(|| Problem::bad(format!("`{address}` names no genotype")))?;
@@ -74,7 +76,7 @@ impl Subject {
     }
 
     /// The experiment with the requested changes.
-    fn compile(&self, what_if: &WhatIf) -> Result<(ExperimentConfig, Simulation), Problem> {
+    pub fn compile(&self, what_if: &WhatIf) -> Result<(ExperimentConfig, Simulation), Problem> {
         let bad = |error: &dyn std::fmt::Display| Problem::bad(error.to_string());
         let config = ExperimentConfig::from_json(&self.config_json, "", ALGORITHMS);
         let (config, _) = config.map_err(|error| bad(&error))?;
@@ -104,12 +106,13 @@ impl Subject {
     }
 }
 
-fn stopping() -> Problem {
+/// The error that nobody waits for the answer any more.
+pub fn stopping() -> Problem {
     Problem::new(StatusCode::SERVICE_UNAVAILABLE, "the server stops")
 }
 
 /// Simulates in turn; stops when the server ends or the browser goes away.
-async fn work<T: Send + 'static>(
+pub async fn work<T: Send + 'static>(
     shared: &Shared,
     simulate: impl FnOnce(&dyn Fn() -> bool) -> Result<T, Problem> + Send + 'static,
 ) -> Result<T, Problem> {
