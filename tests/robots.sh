@@ -4,7 +4,8 @@
 # and that the controller of leader selection fits a small microcontroller.
 #
 # usage: tests/robots.sh [SWARMCTL]; MILLION=1 compares a million robot-steps of each champion of
-# the thesis, too, and all combinations of compilers and champions.
+# the thesis, too, with each compiler and on each processor, and all combinations of compilers and
+# levels with fewer steps. This takes hours, of which most are emulated.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 swarmctl=$(realpath "${1:-target/debug/swarmctl}")
@@ -33,6 +34,24 @@ compare() {
     printf '%s: %s: %s\n' "$directory" "$*" "$text"
     [[ $text == *' robot-steps, 0 bits differ' ]] && [[ $text != *$'\n'* ]] || exit 1
     n_tried=$((n_tried + 1))
+}
+
+# Compares a controller on 32-bit ARM with fused multiply-add, and on 64-bit ARM, both emulated:
+# on_emulated_processors DIRECTORY
+on_emulated_processors() {
+    if has arm-linux-gnueabihf-gcc && has qemu-arm-static; then
+        compare "$1" CC=arm-linux-gnueabihf-gcc RUN=qemu-arm-static \
+            'CFLAGS=-O2 -static -mfpu=vfpv4 -Werror'
+    else
+        skip_installable "exported controllers are not tried on 32-bit ARM: no" \
+            "arm-linux-gnueabihf-gcc and qemu-arm-static"
+    fi
+    if has aarch64-linux-gnu-gcc && has qemu-aarch64-static; then
+        compare "$1" CC=aarch64-linux-gnu-gcc RUN=qemu-aarch64-static 'CFLAGS=-O2 -static -Werror'
+    else
+        skip_installable "exported controllers are not tried on 64-bit ARM: no aarch64-linux-gnu-gcc" \
+            "and qemu-aarch64-static"
+    fi
 }
 
 champions=(leader_selection_snes borderline_snes light_follower_snes orientation_consensus_snes)
@@ -77,28 +96,21 @@ if [[ ${MILLION:-} ]]; then
         done
     done
     for index in "${!champions[@]}"; do
-        name=${champions[index]}
-        export_to "million-$name" "$name" "results/champions/$name-0.json" --trials "${n_trials[index]}"
-        compare "million-$name" CC=gcc "CFLAGS=-O2 ${fused[-1]} -Werror"
-        rm -r "$out/million-$name"
+        name=${champions[index]} large=million-$name
+        export_to "$large" "$name" "results/champions/$name-0.json" --trials "${n_trials[index]}"
+        for fma in "${fused[@]}"; do
+            compare "$large" CC=gcc "CFLAGS=-O2 $fma -Werror"
+            compare "$large" CC=clang "CFLAGS=-O2 $fma -Werror"
+        done
+        on_emulated_processors "$large"
+        rm -r "${out:?}/$large"
     done
 fi
 
-# Emulated processors. The first ARM has fused multiply-add, the second leaves it to the library.
+on_emulated_processors leader_selection_snes
 if has arm-linux-gnueabihf-gcc && has qemu-arm-static; then
-    compare leader_selection_snes CC=arm-linux-gnueabihf-gcc RUN=qemu-arm-static \
-        'CFLAGS=-O2 -static -mfpu=vfpv4 -Werror'
+    # Without fused multiply-add, which the library computes.
     compare small CC=arm-linux-gnueabihf-gcc RUN=qemu-arm-static 'CFLAGS=-O2 -static -Werror'
-else
-    skip_installable "exported controllers are not tried on 32-bit ARM: no arm-linux-gnueabihf-gcc" \
-        "and qemu-arm-static"
-fi
-if has aarch64-linux-gnu-gcc && has qemu-aarch64-static; then
-    compare leader_selection_snes CC=aarch64-linux-gnu-gcc RUN=qemu-aarch64-static \
-        'CFLAGS=-O2 -static -Werror'
-else
-    skip_installable "exported controllers are not tried on 64-bit ARM: no aarch64-linux-gnu-gcc" \
-        "and qemu-aarch64-static"
 fi
 
 # A Cortex-M4F: everything that a robot needs, linked, without what it does not use.
