@@ -3,9 +3,9 @@
 use super::*;
 use crate::testing::{experiment_a, experiment_a_spiking, genotype, robot};
 use experiment_file::{
-    EncodingConfig, EncodingScheme, ExperimentConfig, GenotypeQuery, InhibitedStimulus,
-    LearningConfig, LinearField, NeuronModel, ReceptiveField, RewardConfig, SensorQuery,
-    StimuliInhibitionConfig, StimulusSelector,
+    Drawn, EncodingConfig, EncodingScheme, ExperimentConfig, GenotypeQuery, InhibitedStimulus,
+    LearningConfig, LinearField, NeuronModel, PseudoRealityConfig, ReceptiveField, RewardConfig,
+    SensorQuery, StimuliInhibitionConfig, StimulusSelector,
 };
 
 /// Leader selection with LIF neurons that learn; one stimulus has random spikes.
@@ -33,7 +33,14 @@ fn experiment_a_plastic() -> ExperimentConfig {
 
 #[test]
 fn stepping_with_the_network_of_a_genotype_gives_the_bits_of_its_simulation() {
-    for config in [experiment_a(), experiment_a_plastic()] {
+    let mut elsewhere = experiment_a();
+    robot(&mut elsewhere).perturbations.pseudo_reality = Some(PseudoRealityConfig {
+        actuation_delay: Drawn { low: 1, high: 5 },
+        sensor_noise: Drawn::always(0.1),
+        radio_loss: Drawn { low: 0.1, high: 0.5 },
+        ..Default::default()
+    });
+    for config in [experiment_a(), experiment_a_plastic(), elsewhere] {
         assert_stepping_gives_the_bits(&Simulation::compile(&config).unwrap());
     }
 }
