@@ -18,7 +18,7 @@ from swarmevo.agents.parameters import Budgets
 from swarmevo.agents.serving import server as served
 
 DEFAULT = {"docs", "examples", "schema", "validate", "experiments", "explain", "follow", "history", "individual", "compare",
-           "draft", "run", "fork", "evaluate", "picture", "export", "verify"}
+           "draft", "run", "resume", "fork", "evaluate", "picture", "export", "verify"}
 WRONG = "def fitness(world):\n    return brightness(world)\n\ndef measures(world):\n    return {'x': wrld.step}\n"
 
 
@@ -117,7 +117,7 @@ def test_a_draft_is_validated_mended_and_never_replaces_a_file_of_a_person(tmp_p
         problems = [it["message"] for it in wrong["problems"]]
         assert not wrong["ok"] and len(problems) >= 2 and any("wrld" in it for it in problems)
         error = await call.error("run", file="mine.json")
-        assert error["code"] == "bad_input" and "brightness" in error["message"] and "validate" in error["next"]
+        assert error["code"] == "bad_experiment_file" and "brightness" in error["message"] and "validate" in error["next"]
         right = await call.facts("draft", name="mine", task="aggregation", script=WRONG.replace("brightness(world)", "1").replace("wrld", "world"))
         assert not right["ok"], "the example's sensor needs `sense`"
         right = await call.facts("draft", name="mine", task="aggregation", changes={"world.objects.robot.num_instances": 7})
@@ -182,10 +182,15 @@ def test_budgets_end_a_run_which_the_same_call_continues(tmp_path):
         started = time.monotonic()
         stopped = await call.facts("run", file="long.json", generations=100, seconds=3)
         assert time.monotonic() - started < 13
-        assert stopped["state"] == "stopped by the budget" and stopped["generations_done"] < 100, stopped
+        assert stopped["state"] == "stopped by the budget" and stopped["generations_done"]["1"] < 100, stopped
         assert "the same arguments" in call.made[-1][2].content[0].text
         again = await call.facts("run", file="long.json", generations=100, seconds=3)
-        assert again["generations_done"] > stopped["generations_done"] and again["experiment"] == stopped["experiment"]
+        assert again["generations_done"]["1"] > stopped["generations_done"]["1"]
+        resumed = await call.facts("resume", experiment="1", seconds=3)
+        assert resumed["generations_done"]["1"] > again["generations_done"]["1"]
+        assert (await call.error("resume", experiment="1", episodes=5))["code"] == "budget"
+        several = await call.facts("run", file="long.json", generations=1, seeds=[1, 2], seconds=9)
+        assert [it["state"] for it in several["runs"]] == ["completed"] * 2
 
     drive(served(tmp_path, budgets=Budgets(10, 20_000)), script)
 

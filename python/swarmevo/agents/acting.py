@@ -11,10 +11,9 @@ from . import places
 from .answers import answer
 from .failures import Failure
 from .looking import Looking
-from .parameters import Changes, Experiment, File, settings
+from .parameters import Changes, Experiment, File, Seeds, settings
 
 Priority = Annotated[int, Field(ge=1, le=1000, description="share of the fleet, relative to other experiments")]
-Seeds = Annotated[list[int] | None, Field(min_length=1, max_length=20, description="a run with each of these seeds, as a group")]
 
 
 class Submitting(Looking):
@@ -29,7 +28,7 @@ class Submitting(Looking):
         at = self.program.of("fleet")
         found, step = await self.checked(file)
         if not found["ok"]:
-            raise Failure("bad_input", file, "\n".join(it["message"] for it in found["problems"]), step)
+            raise Failure("bad_experiment_file", file, "\n".join(it["message"] for it in found["problems"]), step)
         options = [f"--priority={priority}"] + [f"--{name}={it}" for name, it in (("generations", generations), ("group", group)) if it is not None]
         options += [f"--seeds={','.join(map(str, seeds))}"] if seeds else []
         submitted = await self.program.document("submit", *at, *options, "--", file, where=file, seconds=60)

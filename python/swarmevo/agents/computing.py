@@ -19,7 +19,7 @@ from .answers import answer, table, text
 from .examples import example
 from .failures import Failure, bad_argument, of_program
 from .looking import HISTORY, Looking
-from .parameters import Address, Changes, Experiment, File, Seconds, Where, settings
+from .parameters import Address, Changes, Experiment, File, Seconds, Seeds, Where, settings
 from .places import NAME, key
 from .program import DATA, Done
 
@@ -61,20 +61,44 @@ class Computing(Looking):
     async def run(
         self, file: File, ctx: Context, seconds: Seconds = None, episodes: Episodes = 100_000,
         generations: Annotated[int | None, Field(ge=1, description="number of generations, instead of the file's")] = None,
-        seed: Annotated[int | None, Field(ge=0, description="seed of all randomness, instead of the file's")] = None,
+        seeds: Seeds = None,
     ) -> CallToolResult:
-        """Evolve an experiment file here, with all processors, until it ends or the budget does. A run that was stopped continues when you call again with the same arguments."""
+        """Evolve an experiment file here, with all processors, until it ends or the budget does. A run that was stopped continues when you call again with the same arguments. Several seeds make a group of runs, named like the experiment."""
         seconds = self.budgets.within(seconds, 30)
         found, step = await self.checked(file)
         if not found["ok"]:
-            raise Failure("bad_input", file, "\n".join(it["message"] for it in found["problems"]), step)
+            raise Failure("bad_experiment_file", file, "\n".join(it["message"] for it in found["problems"]), step)
         each = found["population_size"] * found["trials"]
         n = generations or found["generations"]
-        self.budgets.afford(n * each, episodes, f"a run of {n} generations of {found['population_size']} individuals in {found['trials']} trials",
+        each *= len(seeds or [0])
+        self.budgets.afford(n * each, episodes, f"{n} generations of {found['population_size']} individuals in {found['trials']} trials, for {len(seeds or [0])} seeds",
                             f"give `generations` of {max(1, min(episodes, self.budgets.episodes) // each)} or less, or more `episodes` if the work is worth it")
-        options = [f"--{name}={it}" for name, it in (("generations", generations), ("seed", seed)) if it is not None]
+        options = [] if generations is None else [f"--generations={generations}"]
+        options += [f"--seeds={','.join(map(str, seeds))}"] if seeds else []
         done = await self._evolved(ctx, n, seconds, "run", f"--data-dir={DATA}", *options, "--", file)
-        return outcome(done, file, n, seconds)
+        return outcome(done, file, n, "run, with the same arguments, continues")
+
+    async def resume(
+        self, experiment: Experiment, ctx: Context, seconds: Seconds = None, episodes: Episodes = 100_000,
+        generations: Annotated[int | None, Field(ge=1, description="total number, to extend a completed run")] = None,
+    ) -> CallToolResult:
+        """Continue a run or a fork of this directory that the budget has stopped, or extend a completed one."""
+        places.experiment(experiment)
+        seconds, at = self.budgets.within(seconds, 30), self.program.of("here")
+        about = (await self._explained(experiment, "here")).get("experiment")
+        if about is None:
+            bad_argument("experiment", f"{experiment!r} is a group", "give the number of one of its experiments")
+        n = generations or about["generations"]
+        self._afford_rest(about, about["generations_done"], n, episodes)
+        options = [] if generations is None else [f"--generations={generations}"]
+        done = await self._evolved(ctx, n, seconds, "resume", *at, *options, "--", experiment)
+        return outcome(done, experiment, n, f"resume(experiment=\"{experiment}\") continues")
+
+    def _afford_rest(self, about: dict[str, Any], done: int, n_generations: int, episodes: int) -> None:
+        trials = (about.get("latest") or {}).get("episodes", about["population_size"]) / about["population_size"]
+        rest = max(0, n_generations - done)
+        n = round(rest * about["population_size"] * trials)
+        self.budgets.afford(n, episodes, f"the rest of {rest} generations", "give fewer `generations`, or more `episodes` if the work is worth it")
 
     async def fork(
         self, address: Annotated[str, Field(description="the generation to continue after, such as 3@59")], ctx: Context,
@@ -86,13 +110,14 @@ class Computing(Looking):
         places.address(address, generation_only=True)
         seconds, at = self.budgets.within(seconds, 30), self.program.of("here")
         parent, _, first = address.partition("@")
-        about = (await self.program.document("explain", *at, "--", parent, where=parent))["experiment"]
+        about = (await self._explained(parent, "here")).get("experiment")
+        if about is None:
+            bad_argument("address", f"{parent!r} is a group", "give the number of one of its experiments")
         n = generations or about["generations"]
-        left = max(0, n - int(first) - 1) * about["population_size"]
-        self.budgets.afford(left, episodes, f"a fork of {n} generations in one trial each", "give fewer `generations`, or more `episodes`")
+        self._afford_rest(about, int(first) + 1, n, episodes)
         options = [f"--{name}={it}" for name, it in (("generations", generations), ("seed", seed)) if it is not None]
         done = await self._evolved(ctx, n, seconds, "fork", "--watch", *at, *options, *settings(changes), "--", address)
-        return outcome(done, address, n, seconds)
+        return outcome(done, address, n, "resume(experiment=...) continues")
 
     async def _evolved(self, ctx: Context, n_generations: int, seconds: float, *args: str) -> Done:
         async def report(line: dict[str, Any]) -> None:
@@ -182,22 +207,22 @@ def changed(file: str, changes: dict[str, Any], script: str | None, name: str) -
     return json.dumps(config, indent=2) + "\n"
 
 
-def outcome(done: Done, what: str, n_generations: int, seconds: float) -> CallToolResult:
-    """The end of a run, or how far it came."""
-    completed = [it for it in done.lines if "generation" in it and "best" in it]
+def outcome(done: Done, what: str, n_generations: int, again: str) -> CallToolResult:
+    """The end of a run or of several, or how far they came."""
+    completed = [it for it in done.lines if "best" in it]
     ends = [it for it in done.lines if "state" in it]
-    number = completed[-1]["experiment"] if completed else None
-    curve = table(completed, HISTORY, 6)
-    if done.is_over_budget and not ends:
-        facts = {"state": "stopped by the budget", "experiment": number, "generations_done": completed[-1]["generation"] + 1 if completed else 0,
-                 "generations": n_generations, "curve": curve}
-        return answer(facts, f"call again with the same arguments: it continues where {seconds:g} s have ended")
-    if not ends or done.exit_code not in (0,):
+    curve = table(completed, HISTORY, 6) if len({it["experiment"] for it in completed}) == 1 else None
+    if done.is_over_budget and not (ends and done.exit_code == 0):
+        last = {it["experiment"]: it["generation"] + 1 for it in completed}
+        facts = {"state": "stopped by the budget", "generations_done": last, "generations": n_generations, "curve": curve}
+        return answer(facts, f"{again} where this call has stopped")
+    if not ends or done.exit_code != 0:
         raise of_program(done.exit_code, done.stderr, what)
-    end = ends[-1]
-    facts = {key: it for key, it in end.items() if key != "champion_file"} | {"curve": curve}
-    number = end["experiment"]
-    return answer(facts, f"picture(address=\"{number}\") shows the champion", f"evaluate(address=\"{number}\") tests it",
+    kept = [{key: it for key, it in end.items() if key != "champion_file"} for end in ends]
+    number = ends[0]["experiment"]
+    if len(kept) > 1:
+        return answer({"runs": kept}, "`compare` this group with another one", f"picture(address=\"{number}\") shows the champion of the first")
+    return answer(kept[0] | {"curve": curve}, f"picture(address=\"{number}\") shows the champion", f"evaluate(address=\"{number}\") tests it",
                   f"export(experiment=\"{number}\", file=...) keeps the proof")
 
 

@@ -99,7 +99,7 @@ def _serve(made: Any, address: tuple[str, int], token: str, tls: tuple[str | Non
     import uvicorn
 
     app = guarded(made.streamable_http_app(host=address[0]), token)
-    uvicorn.run(app, host=address[0], port=address[1], log_level="warning", ssl_certfile=tls[0], ssl_keyfile=tls[1], limit_concurrency=CONNECTIONS_MAX)
+    uvicorn.run(app, host=address[0], port=address[1], log_level="warning", ssl_certfile=tls[0], ssl_keyfile=tls[1], ws="none", limit_concurrency=CONNECTIONS_MAX)
 
 
 def guarded(app: ASGIApp, token: str) -> ASGIApp:

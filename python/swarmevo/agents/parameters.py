@@ -17,6 +17,7 @@ Experiment = Annotated[str, Field(description="number or name of an experiment")
 Where = Annotated[Literal["here", "fleet"], Field(description="here: what `run` has computed in the working directory; "
                                                   "fleet: what a coordinator has")]
 Seconds = Annotated[float | None, Field(gt=0, description="time budget of this call")]
+Seeds = Annotated[list[Annotated[int, Field(ge=0)]] | None, Field(min_length=1, max_length=20, description="a run with each of these seeds, instead of the file's")]
 Changes = Annotated[dict[str, Any] | None, Field(description="values by their place in the experiment file, such as "
                                                  '{"world.objects.robot.num_instances": 20}')]
 CHANGES_MAX = 20
@@ -45,7 +46,7 @@ class Budgets:
         most = min(asked, self.episodes)
         if n_episodes > most:
             bound = "`episodes` of this call" if asked <= self.episodes else "the bound of this server"
-            raise Failure("budget", "episodes", f"{what} is {n_episodes} episodes; {bound} is {most}", step)
+            raise Failure("budget", "episodes", f"{what}: {n_episodes} episodes; {bound} is {most}", step)
 
 
 def settings(changes: dict[str, Any] | None) -> list[str]:

@@ -30,7 +30,7 @@ step; every error has a code, a place, a message and a next step. docs(section="
 
 FLAGS = {"submit": "--allow-submit", "fork_on_fleet": "--allow-submit", "control": "--allow-control"}
 LOOKING = ("docs", "examples", "schema", "validate", "experiments", "explain", "follow", "history", "individual", "compare")
-COMPUTING = ("draft", "run", "fork", "evaluate", "picture", "export", "verify")
+COMPUTING = ("draft", "run", "resume", "fork", "evaluate", "picture", "export", "verify")
 
 
 class Server(MCPServer[Any]):
