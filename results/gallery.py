@@ -16,7 +16,7 @@ from report import RESULTS, print_or_update, read_csv
 PAGE = RESULTS.parent / "docs" / "gallery.md"
 ORDER = [
     "aggregation", "chain", "flocking", "synchronisation", "division_of_labour", "foraging", "dispersion", "predator",
-    "transport", "slalom", "gather", "harvest", "maze",
+    "transport", "slalom", "gather", "harvest", "maze", "cluster",
 ]
 ENOUGH = 0.8
 HEAD = ["task", "seeds that solve it", "share solved", "fitness", "minutes", "share solved by hand", "fitness by hand"]

@@ -56,7 +56,7 @@ macro_rules! scripted {
 }
 
 /// All examples, from the quickest to those that take minutes.
-pub const EXAMPLES: [Example; 20] = [
+pub const EXAMPLES: [Example; 21] = [
     built_in!("quickstart", "", "leader", "Five robots agree on a leader by radio, in seconds"),
     scripted!("dispersion", "Robots spread out; they sense how near others are"),
     scripted!("aggregation", "Robots gather; they sense where others are"),
@@ -75,6 +75,7 @@ pub const EXAMPLES: [Example; 20] = [
     scripted!("gather", "Robots with bodies gather in a room, with one bit of sight"),
     scripted!("harvest", "Robots with bodies carry food through a door to a nest"),
     scripted!("maze", "Robots with bodies explore a maze"),
+    scripted!("cluster", "Kilobots gather in a room; they sense distances only"),
     built_in!(
         "leader_selection_snes",
         "",

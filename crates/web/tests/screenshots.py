@@ -28,7 +28,7 @@ REPLAYS = {
 TASKS = {
     "foraging": 0, "division_of_labour": 0, "flocking": 0, "synchronisation": 0,
     "aggregation": 0, "dispersion": 0, "chain": 0, "predator": 1,
-    "transport": 0, "slalom": 0, "gather": 0, "harvest": 0, "maze": 0,
+    "transport": 0, "slalom": 0, "gather": 0, "harvest": 0, "maze": 0, "cluster": 0,
 }
 
 
