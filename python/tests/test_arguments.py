@@ -71,6 +71,10 @@ CASES = {
     },
     "Network.to_c.generation": lambda it: QUICK.network(GENES).to_c(FOLDER.name, it),
     "Network.to_c.trials": lambda it: QUICK.network(GENES).to_c(FOLDER.name, 0, trials=it),
+    **{
+        f"judge.{key}": lambda it, key=key: swarmevo.judge(["def control(robot): robot.led = True"], QUICK, **{"trials": 1, key: it})
+        for key in ("trials", "generations", "threads")
+    },
     "TrialSet.generation": lambda it: QUICK.evaluate(GENES, swarmevo.TrialSet("generation", it)),
     "TrialSet.block": lambda it: QUICK.evaluate(GENES, swarmevo.TrialSet("held_out", 0, it)),
     "TrialSet.of.trials": swarmevo.TrialSet.of,
