@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 
 from hypotheses import changed
-from report import RESULTS, print_or_update, read_csv
+from report import RESULTS, markdown, print_or_update, read_csv
 
 PAGE = RESULTS.parent / "docs" / "bodies.md"
 TABLE = RESULTS / "bodies.csv"
@@ -76,11 +76,10 @@ def cell(rows):
 
 def table():
     rows = read_csv(TABLE)
-    lines = [["", *CONDITIONS], ["---"] * (1 + len(CONDITIONS))]
-    for experiment, task, _ in TASKS:
-        lines.append([experiment, *(cell([row for row in rows if (row["task"], row["condition"]) == (task, condition)])
-                                    for condition in CONDITIONS)])
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+    return markdown(["", *CONDITIONS], (
+        [experiment, *(cell([row for row in rows if (row["task"], row["condition"]) == (task, condition)])
+                       for condition in CONDITIONS)]
+        for experiment, task, _ in TASKS))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ the last third of the episodes, on average over all trials. Needs Python 3.9 and
 import csv
 import statistics
 
-from report import RESULTS, print_or_update, read_csv
+from report import RESULTS, markdown, print_or_update, read_csv
 
 PAGE = RESULTS.parent / "docs" / "gallery.md"
 ORDER = [
@@ -49,9 +49,7 @@ def line(task, rows):
 def table():
     with (RESULTS / "by-hand.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    lines = [HEAD, ["---"] * len(HEAD)]
-    lines += [line(task, [row for row in rows if row["task"] == task]) for task in ORDER]
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+    return markdown(HEAD, (line(task, [row for row in rows if row["task"] == task]) for task in ORDER))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from itertools import combinations
 from pathlib import Path
 
 from hypotheses import changed
-from report import RESULTS, print_or_update, read_csv
+from report import RESULTS, markdown, print_or_update, read_csv
 
 PAGE = RESULTS.parent / "docs" / "robots.md"
 TABLE = RESULTS / "realities.csv"
@@ -124,8 +124,8 @@ def of_champions():
     """A row per task: the champion of seed 0, and the drops of all seeds as shares of the nominal fitness."""
     rows = read_csv(TABLE)
     ranks = {row["task"]: row for row in read_csv(RANKS)}
-    lines = [["champion", "nominal", "realities", "worst tenth", "drop", "what breaks it", "share lost, all seeds", "tau"]]
-    lines.append(["---"] * len(lines[0]))
+    head = ["champion", "nominal", "realities", "worst tenth", "drop", "what breaks it", "share lost, all seeds", "tau"]
+    lines = []
     for task, title in TASKS.items():
         name = Path(task).name
         of_task = [row for row in rows if row["task"] == name]
@@ -137,7 +137,7 @@ def of_champions():
         tau = f"{float(rank['tau']):.2f} (p = {float(rank['p']):.2f}; {rank['champions']})" if rank["tau"] else ""
         lines.append([title, *(f"{number(whole, key):.3f}" for key in ("nominal", "mean", "worst_tenth")), drop(whole),
                       "; ".join(causes) or "no key for certain", f"{shares[0]:.0%} to {shares[-1]:.0%}", tau])
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+    return markdown(head, lines)
 
 
 def chance(a, b):
@@ -153,8 +153,7 @@ def chance(a, b):
 
 def of_evolved():
     """A row per champion of quickstart, and how the two samples differ."""
-    lines = [["evolved", "seed", "nominal", "realities", "worst tenth", "drop"]]
-    lines.append(["---"] * len(lines[0]))
+    head, lines = ["evolved", "seed", "nominal", "realities", "worst tenth", "drop"], []
     rows = [row for row in read_csv(EVOLVED) if row["key"] == ""]
     keys = ("nominal", "mean", "worst_tenth")
     for row in rows:
@@ -165,7 +164,7 @@ def of_evolved():
         lines.append([sample[0]["evolved"], "median", *middle])
     p = (chance(*([number(row, key) for row in sample] for sample in samples)) for key in (*keys, "drop"))
     lines.append(["", "p of the difference", *(f"{value:.3f}" for value in p)])
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+    return markdown(head, lines)
 
 
 if __name__ == "__main__":

@@ -31,12 +31,14 @@ MODELS = {
 STEPS = (0, 10, 12, 14, 16, 20, 24, 50, 100, 200, 250, 300, 500, 660, 700, 1000)
 
 
+def markdown(head, rows):
+    """A table as text."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(map(str, cells))} |\n" for cells in lines)
+
+
 def table(head, rows):
-    print("| " + " | ".join(map(str, head)) + " |")
-    print("|" + "---|" * len(head))
-    for row in rows:
-        print("| " + " | ".join(str(cell) for cell in row) + " |")
-    print()
+    print(markdown(head, rows))
 
 
 def number(value, digits=3):

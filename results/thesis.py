@@ -12,7 +12,7 @@ over all runs. Readings without runs in results/ have no row. Needs Python 3.9 a
 import json
 import statistics
 
-from report import LAST, RESULTS, print_or_update, read_csv
+from report import LAST, RESULTS, markdown, print_or_update, read_csv
 
 PAGE = RESULTS.parent / "docs" / "reproduction.md"
 # Experiment, reading, algorithm, and the name of the experiment file.
@@ -44,7 +44,7 @@ def spread(values):
 
 
 def row(experiment, reading, algorithm, name):
-    """A line of the table; nothing without runs."""
+    """The row of the table, as a list; an empty one without runs."""
     stems = sorted(path.stem for path in (RESULTS / "champions").glob(f"{name}-*.json"))
     if not stems:
         return []
@@ -63,13 +63,12 @@ def row(experiment, reading, algorithm, name):
         f"{statistics.median(means):.3f}{spread(means)}",
         f"{worth}{spread([it['mean'] for it in worths])}",
     ]
-    return ["| " + " | ".join(map(str, cells)) + " |"]
+    return [cells]
 
 
 def table():
     head = ["experiment", "reading", "algorithm", "seeds", "generations", f"mean, last {LAST}", "champion"]
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    return "\n".join(sum((row(*reading) for reading in READINGS), lines)) + "\n"
+    return markdown(head, sum((row(*reading) for reading in READINGS), []))
 
 
 if __name__ == "__main__":
