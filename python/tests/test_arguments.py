@@ -153,7 +153,6 @@ CASES = {
     "analysis.CTRNN.equilibria.starts": lambda it: alone().equilibria([0.0], starts=it),
     "analysis.CTRNN.equilibria.seed": lambda it: alone().equilibria([0.0], seed=it),
 }
-OPTIONAL = re.compile(r"threads|seed|generations?$|priority|trials?$|trial_set|population_size|robots|steps$|agents")
 
 
 def alone():
