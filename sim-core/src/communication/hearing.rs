@@ -6,58 +6,14 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
+use super::antenna::{Antenna, Receiver};
 use crate::neighbours::Neighbours;
-use crate::sensors::Decay;
 use crate::torus::{Vec2, angular_difference, sector_angle, wrap_angle};
 use determinism::Isa;
-use experiment_file::SendingDirection;
 
 /// Tolerance of sector borders, radians, so that a border belongs to both sectors in spite of
 /// rounding.
 const BORDER: f64 = 1e-12;
-
-/// The properties of a robot's receiver and transmitter.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Antenna {
-    /// Reach of the transmitter, cm; `None`: the robot does not emit.
-    pub emits_within: Option<f64>,
-    /// The receiver; `None`: the robot does not listen.
-    pub receiver: Option<Receiver>,
-}
-
-impl Antenna {
-    /// Distance within which others hear the robot, cm; negative if it does not emit.
-    pub fn reach(&self) -> f64 {
-        self.emits_within.unwrap_or(-1.0)
-    }
-
-    /// Multiplies the reaches of receiver and transmitter by a factor.
-    pub fn scale(&mut self, factor: f64) {
-        if let Some(reach) = &mut self.emits_within {
-            *reach *= factor;
-        }
-        if let Some(receiver) = &mut self.receiver {
-            receiver.range *= factor;
-        }
-    }
-}
-
-/// The properties of a receiver.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Receiver {
-    /// Sectors, n.
-    pub n_sectors: usize,
-    /// Reach, cm.
-    pub range: f64,
-    /// Fading of the strength.
-    pub decay: Decay,
-    /// Frames with this many hops are not accepted.
-    pub max_hops: u32,
-    /// The robot whose sector is the sending direction.
-    pub sending_direction: SendingDirection,
-    /// Whether to compute sending directions: only some networks get them.
-    pub observes_sending_direction: bool,
-}
 
 /// Number of robots to process together, few enough for their scratch data to stay in the cache.
 const N_LISTENERS_AT_ONCE: usize = 128;
@@ -377,7 +333,9 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
     use super::*;
+    use crate::sensors::Decay;
     use crate::torus::Torus;
+    use experiment_file::SendingDirection;
 
     const TORUS: Torus = Torus::new(1000.0, 1000.0);
     const ANTENNA: Antenna = Antenna {

@@ -1,12 +1,13 @@
 //! The wireless link between robots (section 3.3 of the thesis).
 
+mod antenna;
 mod frame;
 mod hearing;
 mod quantisation;
 mod radio;
 
+pub(crate) use antenna::{Antenna, Receiver};
 pub(crate) use frame::FrameOrigin;
-pub(crate) use hearing::{Antenna, Receiver};
 pub(crate) use quantisation::Quantiser;
 pub(crate) use radio::Radio;
 

@@ -2,25 +2,18 @@
 //! choices.
 
 use super::Mode;
+use super::antenna::Antenna;
 use super::frame::{Ether, FrameOrigin};
-use super::hearing::{Antenna, Heard, Hearing, Listeners, Receiver};
+use super::hearing::{Heard, Hearing, Listeners};
 use super::quantisation::Scratch;
 use crate::neighbours::Neighbours;
 use crate::swarm::{Received, Swarm, antennas};
 use crate::testimony::{Frame, HeardFrame};
-use crate::torus::{Vec2, sector_angle};
+use crate::torus::Vec2;
 use crate::world::{RobotGroup, World};
 use determinism::Isa;
 use determinism::random::Stream;
 use experiment_file::SendingDirection;
-
-impl Receiver {
-    /// (cos, sin) of each sector in its robot's own frame of reference.
-    pub fn directions(&self) -> impl Iterator<Item = Vec2> + use<> {
-        let n_sectors = self.n_sectors;
-        (0..n_sectors).map(move |sector| Vec2::unit(sector_angle(sector, n_sectors)))
-    }
-}
 
 /// State of the wireless link.
 #[derive(Debug)]

@@ -5,8 +5,8 @@ use experiment_file::{ActuatorQuery, DecodingConfig, TopologyConfig, WheelActuat
 
 use super::communication::draw;
 use super::network::neurons_of;
+use super::robot::Robot;
 use super::torus::{Torus, wrap_angle};
-use super::world::Robot;
 
 /// The actions of a robot in a step.
 #[derive(Clone, Debug)]

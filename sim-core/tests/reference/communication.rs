@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use experiment_file::{SendingDirection, WirelessTransmitterConfig};
 
+use super::robot::Robot;
 use super::torus::{Torus, Vector, angular_difference, sector_direction};
-use super::world::Robot;
 
 /// The frame that a robot emits.
 #[derive(Clone, Debug)]

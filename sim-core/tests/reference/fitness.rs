@@ -7,8 +7,8 @@ use experiment_file::FitnessFunction;
 use super::alpha_shape::borderline;
 use super::lights::Light;
 use super::perturbations::SoleLeader;
+use super::robot::Robot;
 use super::torus::{Torus, Vector, angular_difference};
-use super::world::Robot;
 
 /// Fitness of a trial: the mean over its steps. `alignment` leaves out the first
 /// 100.

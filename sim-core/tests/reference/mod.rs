@@ -21,6 +21,7 @@ mod lights;
 mod network;
 mod perturbations;
 mod reality;
+mod robot;
 mod sensors;
 mod spiking;
 mod torus;

@@ -5,8 +5,9 @@ use experiment_file::{DistanceSensorConfig, LightSensorConfig, SensorQuery};
 
 use super::communication::Reception;
 use super::lights::Light;
+use super::robot::Robot;
 use super::torus::{Torus, Vector, angular_difference, sector_direction};
-use super::world::{Area, Robot};
+use super::world::Area;
 
 /// Everything a robot perceives in a step.
 pub struct Readings {

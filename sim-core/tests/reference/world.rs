@@ -3,7 +3,7 @@
 use determinism::random::{Purpose, Stream};
 use experiment_file::{
     ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams, Initializer,
-    ObjectConfig, RobotConfig, RobotController, WirelessTransmitterConfig,
+    ObjectConfig, RobotConfig, RobotController,
 };
 
 use super::actuators::{self, Actions};
@@ -14,82 +14,11 @@ use super::initializers::{headings, positions};
 use super::learning::Learner;
 use super::lights::Light;
 use super::perturbations::{SoleLeader, affected_robots, inhibits, rotation};
-use super::reality::{self, Reality};
+use super::reality;
+use super::robot::Robot;
 use super::sensors::{self, Readings};
-use super::spiking::SpikingState;
 use super::torus::{Torus, Vector};
 use super::witness::Witness;
-
-/// A robot: its configuration, its pose, and its last actions.
-pub struct Robot<'a> {
-    pub config: &'a RobotConfig,
-    object_idx: usize,
-    pub position: Vector,
-    pub heading: f64,
-    /// Its network, whose weights change if it learns.
-    network: Controller,
-    learner: Option<Learner<'a>>,
-    /// State of a network of rate neurons.
-    pub v: Vec<f64>,
-    /// State of a network of spiking neurons.
-    spiking: SpikingState,
-    /// Mode in force: send (or relay).
-    pub send: bool,
-    pub led: u32,
-    /// Actions of the right and left wheel.
-    pub wheels: [f64; 2],
-    pub on_air: Option<Frame>,
-    pub received: Option<Reception>,
-    pub is_faulty: bool,
-    /// Whether it is affected, per entry of `stimuli_inhibition`.
-    is_inhibited: Vec<bool>,
-    is_uncontrollable: bool,
-    pub reality: Option<Reality>,
-    reception: Stream,
-    quantisation: Stream,
-    decoding: Stream,
-    noise: Stream,
-}
-
-impl Robot<'_> {
-    pub fn transmitter(&self) -> &WirelessTransmitterConfig {
-        self.config
-            .actuators
-            .wireless_transmitter
-            .as_ref()
-            .expect("every emitter has a transmitter")
-    }
-
-    pub fn n_receiver_sectors(&self) -> u32 {
-        self.config.sensors.wireless_receiver.as_ref().expect("emitters have sectors").n_sectors
-    }
-
-    /// Distance below which two robots of this kind hear each other, cm.
-    pub fn communication_range(&self) -> f64 {
-        let receiver = self.config.sensors.wireless_receiver.as_ref();
-        let receiver = receiver.expect("the fitness function needs a receiver");
-        receiver.range.min(self.transmitter().range)
-    }
-
-    /// Heading of the robot's radio.
-    pub fn antenna_heading(&self) -> f64 {
-        self.heading + self.reality.as_ref().map_or(0.0, |reality| reality.antenna_angle)
-    }
-
-    /// Factor of the reach of the robot's radio.
-    pub fn radio_range(&self) -> f64 {
-        self.reality.as_ref().map_or(1.0, |reality| reality.radio_range)
-    }
-
-    /// Message length M; 0 without a wireless link.
-    fn msg_length(&self) -> usize {
-        let sensors = &self.config.sensors;
-        let actuators = &self.config.actuators;
-        let receiver = sensors.wireless_receiver.as_ref().map(|receiver| receiver.msg_length);
-        let transmitter = actuators.wireless_transmitter.as_ref().map(|config| config.msg_length);
-        receiver.or(transmitter).unwrap_or(0) as usize
-    }
-}
 
 /// A coloured disc.
 pub struct Area<'a> {
