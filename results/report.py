@@ -33,8 +33,8 @@ STEPS = (0, 10, 12, 14, 16, 20, 24, 50, 100, 200, 250, 300, 500, 660, 700, 1000)
 
 def markdown(head, rows):
     """A table as text."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(map(str, cells))} |\n" for cells in lines)
+    line = lambda cells: f"| {' | '.join(map(str, cells))} |\n"
+    return line(head) + "|" + "---|" * len(head) + "\n" + "".join(map(line, rows))
 
 
 def table(head, rows):
