@@ -68,7 +68,7 @@ pub struct ExperimentArgs {
 impl ExperimentArgs {
     /// An experiment file, without options that replace its values.
     #[cfg(test)]
-    pub fn of(config: PathBuf) -> Self {
+    pub fn only(config: PathBuf) -> Self {
         Self {
             config: Some(config),
             example: None,

@@ -183,7 +183,7 @@ mod tests {
 
     fn args(config: PathBuf) -> SubmitArgs {
         let seed = SeedArg { seed: Some(7) };
-        let mut experiment = ExperimentArgs::of(config);
+        let mut experiment = ExperimentArgs::only(config);
         experiment.seed = seed;
         SubmitArgs { experiment, priority: Some(200), reuse: false, watch: false }
     }

@@ -136,7 +136,7 @@ pub fn export(
         1 => format!("trial {} of {trial_set}", trials.start),
         _ => format!("trials {} to {} of {trial_set}", trials.start, trials.end.saturating_sub(1)),
     };
-    let names = Names::of(&blueprint);
+    let names = Names::new(&blueprint);
     let mut texts = vec![
         ("README.md", readme::page(&blueprint, &names, about, &episodes)),
         ("controller.h", interface::header(&blueprint, &names, about)),
@@ -163,7 +163,7 @@ struct Names {
 }
 
 impl Names {
-    fn of(blueprint: &Blueprint) -> Self {
+    fn new(blueprint: &Blueprint) -> Self {
         // The member `reward` comes after the stimuli.
         let reward = plastic::takes_reward(blueprint).then_some("reward");
         let stimuli = blueprint.stimuli.iter().map(|stimulus| &*stimulus.name);

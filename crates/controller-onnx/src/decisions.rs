@@ -13,7 +13,7 @@ pub fn put(graph: &mut Builder, blueprint: &Blueprint, activities: &str) -> Vec<
         [ActuatorQuery::Wheels, ActuatorQuery::Led, ActuatorQuery::Mode, ActuatorQuery::Message]
     {
         // If several outputs drive an actuator, the last one decides.
-        let mut of_actuator = blueprint.outputs.iter().filter(|it| it.actuator == actuator);
+        let mut of_actuator = blueprint.outputs.iter().filter(|output| output.actuator == actuator);
         let Some(output) = of_actuator.next_back() else { continue };
         let (name, width, doc) = match actuator {
             ActuatorQuery::Wheels => wheels(graph, output, activities),

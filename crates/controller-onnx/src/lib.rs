@@ -76,7 +76,7 @@ pub fn export(
     }
     let mut graph = Builder::default();
     let names: Vec<String> =
-        blueprint.stimuli.iter().map(|it| format!("stimulus_{}", it.name)).collect();
+        blueprint.stimuli.iter().map(|stimulus| format!("stimulus_{}", stimulus.name)).collect();
     let mut inputs: Vec<_> = names
         .iter()
         .zip(&blueprint.stimuli)

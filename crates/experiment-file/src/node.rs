@@ -406,7 +406,9 @@ impl<'a> Object<'a> {
         let property = |value: &'a Value<'a>, key: &&str| match value {
             Value::Object(object) => {
                 let mut properties = object.properties.iter();
-                properties.find(|property| property.name.as_str() == *key).map(|it| &it.value)
+                properties
+                    .find(|property| property.name.as_str() == *key)
+                    .map(|property| &property.value)
             }
             _ => None,
         };

@@ -17,7 +17,7 @@ pub struct Description {
 }
 
 impl Description {
-    pub fn of(value: &Value) -> Self {
+    pub fn read(value: &Value) -> Self {
         let text = sentence(value);
         let (first, rest) = text.split_at(first_sentence(&text));
         let (meaning, default) = first.split_once("; default ").unwrap_or((first, ""));

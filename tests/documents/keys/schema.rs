@@ -147,7 +147,7 @@ impl Schema {
     }
 
     fn key(&self, name: &str, value: &Value, is_required: bool, of: &str) -> Key {
-        let Description { meaning, unit, default } = Description::of(value);
+        let Description { meaning, unit, default } = Description::read(value);
         let default = match &value["default"] {
             _ if is_required => "required".to_owned(),
             Value::Null | Value::Array(_) => default,

@@ -113,7 +113,8 @@ impl Ranking {
             evaluations.iter().map(|(_, (_, found))| value(found)).collect()
         };
         let (nominal, mean) = (column(|found| found.nominal), column(|found| found.mean));
-        let rank = |values: &[f64], own: f64| 1 + values.iter().filter(|it| **it > own).count();
+        let rank =
+            |values: &[f64], own: f64| 1 + values.iter().filter(|value| **value > own).count();
         let champions = evaluations.iter().map(|(name, (_, found))| Champion {
             evaluation: (*name).clone(),
             nominal: found.nominal,
@@ -251,7 +252,11 @@ mod tests {
         let names: Vec<String> = names.collect();
         assert!(names.iter().all(|name| is_evaluation(name)));
         let ranking = Ranking::read(&names).unwrap();
-        let ranks: Vec<_> = ranking.champions.iter().map(|it| (it.nominal_rank, it.rank)).collect();
+        let ranks: Vec<_> = ranking
+            .champions
+            .iter()
+            .map(|champion| (champion.nominal_rank, champion.rank))
+            .collect();
         assert_eq!(ranks, [(1, 2), (2, 1), (3, 3), (3, 4)]);
         let tau = ranking.kendall.unwrap().tau;
         assert!((tau - 3.0 / 30.0_f64.sqrt()).abs() < 1e-12, "{tau}");

@@ -83,7 +83,7 @@ pub fn all(
     if realities.is_some() {
         let robots = config.algorithm.evolvable_object.clone();
         let path = ["world", "objects", &robots, "perturbations"];
-        if base.get_mut(path).is_some_and(|it| it.remove("pseudo_reality")) {
+        if base.get_mut(path).is_some_and(|perturbations| perturbations.remove("pseudo_reality")) {
             let path = format!("{}.pseudo_reality", path.join("."));
             base_changes.push(Change::new(path, Json::Scalar(serde_json::Value::Null)));
             config = read("--base", &base)?;

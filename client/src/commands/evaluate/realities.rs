@@ -144,7 +144,7 @@ fn has(config: &ExperimentConfig, robot: &RobotConfig, what: Need) -> bool {
             }
             _ => SensorQuery::ALL
                 .iter()
-                .any(|it| it.is_measured() && robot.sensors.reading_len(*it).is_some()),
+                .any(|query| query.is_measured() && robot.sensors.reading_len(*query).is_some()),
         },
         Need::Radio => robot.sensors.wireless_receiver.is_some(),
     }
@@ -307,7 +307,7 @@ mod tests {
 
     #[test]
     fn every_key_of_the_file_has_its_row() {
-        let keys = PseudoRealityConfig::TABLE.parameters.iter().map(|it| it.key);
+        let keys = PseudoRealityConfig::TABLE.parameters.iter().map(|parameter| parameter.key);
         let keys: Vec<&str> = keys.filter(|key| *key != "format").collect();
         assert_eq!(keys, KEYS.map(|(key, _)| key));
     }
@@ -376,7 +376,8 @@ mod tests {
         // All trials agree, so only the realities make the interval.
         let [low, high] = found.drop.ci95.unwrap();
         assert!((low - 0.5).abs() < 1e-12 && (high - 1.5).abs() < 1e-12, "{low} {high}");
-        let causes: Vec<_> = found.causes.iter().map(|it| (it.key, it.drop.value)).collect();
+        let causes: Vec<_> =
+            found.causes.iter().map(|cause| (cause.key, cause.drop.value)).collect();
         assert_eq!(causes, [("radio_range", 1.0), ("radio_loss", 0.0)]);
         assert_eq!(found.causes[0].drop.ci95, Some([1.0; 2]));
     }

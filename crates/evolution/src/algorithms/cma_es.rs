@@ -50,9 +50,9 @@ impl Described for CmaEs {
     /// C = I.
     fn start(params: &Params, d: usize) -> Self {
         Self {
-            mean: vec![params.of(&MU_INIT); d],
+            mean: vec![params.value_of(&MU_INIT); d],
             covariance: Symmetric::identity(d),
-            cumulation: Cumulation::new(params.of(&SIGMA_INIT), d),
+            cumulation: Cumulation::new(params.value_of(&SIGMA_INIT), d),
         }
     }
 }

@@ -60,15 +60,15 @@ impl Described for OpenAiEs {
     };
 
     fn start(params: &Params, d: usize) -> Self {
-        let mu_init = params.of(&MU_INIT);
+        let mu_init = params.value_of(&MU_INIT);
         Self {
             mu: vec![mu_init; d],
             mu_init,
-            sigma: params.of(&SIGMA),
-            learning_rate: params.of(&LEARNING_RATE),
-            beta1: params.of(&BETA1),
-            beta2: params.of(&BETA2),
-            weight_decay: params.of(&WEIGHT_DECAY),
+            sigma: params.value_of(&SIGMA),
+            learning_rate: params.value_of(&LEARNING_RATE),
+            beta1: params.value_of(&BETA1),
+            beta2: params.value_of(&BETA2),
+            weight_decay: params.value_of(&WEIGHT_DECAY),
             first_moment: vec![0.0; d],
             second_moment: vec![0.0; d],
             n_updates: 0,

@@ -42,9 +42,9 @@ impl Described for SepCmaEs {
     /// C = I.
     fn start(params: &Params, d: usize) -> Self {
         Self {
-            mean: vec![params.of(&MU_INIT); d],
+            mean: vec![params.value_of(&MU_INIT); d],
             variances: vec![1.0; d],
-            cumulation: Cumulation::new(params.of(&SIGMA_INIT), d),
+            cumulation: Cumulation::new(params.value_of(&SIGMA_INIT), d),
         }
     }
 }

@@ -46,10 +46,10 @@ impl Described for Snes {
     fn start(params: &Params, d: usize) -> Self {
         let default_eta_sigma = (3.0 + libm::log(d as f64)) / (5.0 * (d as f64).sqrt());
         Self {
-            mu: vec![params.of(&MU_INIT); d],
-            sigma: vec![params.of(&SIGMA_INIT); d],
-            eta_mu: params.of(&ETA_MU),
-            eta_sigma: params.of::<Option<f64>>(&ETA_SIGMA).unwrap_or(default_eta_sigma),
+            mu: vec![params.value_of(&MU_INIT); d],
+            sigma: vec![params.value_of(&SIGMA_INIT); d],
+            eta_mu: params.value_of(&ETA_MU),
+            eta_sigma: params.value_of::<Option<f64>>(&ETA_SIGMA).unwrap_or(default_eta_sigma),
         }
     }
 }

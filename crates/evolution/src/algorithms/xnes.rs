@@ -78,15 +78,15 @@ impl Described for Xnes {
         let default_eta = (9.0 + 3.0 * libm::log(size)) / (5.0 * size * size.sqrt());
         let is_fast = params.get(&RATES) == Some(FAST.into());
         let default_sigma = if is_fast { default_eta * size / 3.0 } else { default_eta };
-        let eta_sigma = params.of::<Option<f64>>(&ETA_SIGMA).unwrap_or(default_sigma);
+        let eta_sigma = params.value_of::<Option<f64>>(&ETA_SIGMA).unwrap_or(default_sigma);
         let default_b = if is_fast { 2.0 * default_eta } else { eta_sigma };
         Self {
-            mu: vec![params.of(&MU_INIT); d],
-            sigma: params.of(&SIGMA_INIT),
+            mu: vec![params.value_of(&MU_INIT); d],
+            sigma: params.value_of(&SIGMA_INIT),
             shape: DMatrix::<f64>::identity(d, d).as_slice().to_vec(),
-            eta_mu: params.of(&ETA_MU),
+            eta_mu: params.value_of(&ETA_MU),
             eta_sigma,
-            eta_b: params.of::<Option<f64>>(&ETA_B).unwrap_or(default_b),
+            eta_b: params.value_of::<Option<f64>>(&ETA_B).unwrap_or(default_b),
         }
     }
 }

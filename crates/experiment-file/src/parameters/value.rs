@@ -84,7 +84,7 @@ impl Params {
     ///
     /// If the value has another type, which cannot happen, because parameters are checked before
     /// they are used.
-    pub fn of<T: TryFrom<ParameterValue, Error = ParameterValue>>(
+    pub fn value_of<T: TryFrom<ParameterValue, Error = ParameterValue>>(
         &self,
         parameter: &Parameter,
     ) -> T {

@@ -179,7 +179,7 @@ pub struct AtRest {
 
 impl AtRest {
     /// `None` if a program uses the database: then there is a log.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn look(path: &Path) -> Option<Self> {
         let metadata = fs::metadata(path).ok().filter(|_| !write_ahead_log::exists(path))?;
         Some(Self { len: metadata.len(), modified: metadata.modified().ok()? })
     }
@@ -188,7 +188,7 @@ impl AtRest {
 /// Opens a database for reading, even while another program uses it, and leaves no files beside
 /// it.
 pub fn open_read_only(path: &Path) -> rusqlite::Result<Connection> {
-    open_read_only_as(path, AtRest::of(path))
+    open_read_only_as(path, AtRest::look(path))
 }
 
 /// As [`open_read_only`]. A connection to a database at rest reads that state of the file alone: it

@@ -127,7 +127,7 @@ impl Store {
     pub fn open_read_only(directory: &Path) -> Result<Self> {
         must_be_in(directory)?;
         let path = file::path_in(directory);
-        let at_rest = AtRest::of(&path);
+        let at_rest = AtRest::look(&path);
         let open = || {
             let connection = file::open_read_only_as(&path, at_rest)?;
             let version = schema::version(&connection)?;
@@ -150,7 +150,7 @@ impl Store {
     /// Opens the database again if it was at rest and is no longer: the old connection would read
     /// pages of both states, as if it was damaged. After a failure, the next call tries again.
     pub fn keep_up(&mut self) {
-        if self.at_rest.is_none() || self.at_rest == AtRest::of(&self.path) {
+        if self.at_rest.is_none() || self.at_rest == AtRest::look(&self.path) {
             return;
         }
         if let Some(Ok(store)) = self.path.parent().map(Self::open_read_only) {

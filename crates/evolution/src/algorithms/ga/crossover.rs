@@ -49,9 +49,9 @@ pub const ALPHA: Parameter = Parameter::amount(
 impl Crossover {
     /// The configured operator.
     pub fn new(params: &Params) -> Self {
-        match params.of::<String>(&OPERATOR).as_str() {
+        match params.value_of::<String>(&OPERATOR).as_str() {
             // SpikeSwarmSim has two names for this operator.
-            "blxalpha" | "combination" => Self::BlxAlpha { alpha: params.of(&ALPHA) },
+            "blxalpha" | "combination" => Self::BlxAlpha { alpha: params.value_of(&ALPHA) },
             "uniform" => Self::Uniform,
             "onepoint" => Self::OnePoint,
             "multipoint" => Self::MultiPoint,

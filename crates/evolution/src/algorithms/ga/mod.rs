@@ -75,12 +75,12 @@ impl Described for Ga {
     fn start(params: &Params, d: usize) -> Self {
         Self {
             d,
-            n_elite: params.of::<u32>(&NUM_ELITE) as usize,
+            n_elite: params.value_of::<u32>(&NUM_ELITE) as usize,
             selection: Selection::new(params),
             crossover: Crossover::new(params),
-            crossover_prob: params.of(&CROSSOVER_PROB),
+            crossover_prob: params.value_of(&CROSSOVER_PROB),
             mutation: Mutation::new(params),
-            mutation_prob: params.of(&MUTATION_PROB),
+            mutation_prob: params.value_of(&MUTATION_PROB),
             ranked: Vec::new(),
             fitness: Vec::new(),
         }

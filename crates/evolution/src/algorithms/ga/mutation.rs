@@ -49,8 +49,8 @@ pub const CATEGORIES: Parameter = Parameter::of(
 impl Mutation {
     /// The configured operator.
     pub fn new(params: &Params) -> Self {
-        match params.of::<String>(&OPERATOR).as_str() {
-            "gaussian" => Self::Gaussian { sigma: params.of(&SIGMA) },
+        match params.value_of::<String>(&OPERATOR).as_str() {
+            "gaussian" => Self::Gaussian { sigma: params.value_of(&SIGMA) },
             "uniform" => Self::Uniform,
             "bitflip" => Self::BitFlip,
             "categorical" => Self::Categorical {

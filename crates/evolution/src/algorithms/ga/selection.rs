@@ -47,8 +47,10 @@ pub const TOURNAMENT_SIZE: Parameter = Parameter::whole(
 impl Selection {
     /// The configured operator.
     pub fn new(params: &Params) -> Self {
-        match params.of::<String>(&OPERATOR).as_str() {
-            "tournament" => Self::Tournament { size: params.of::<u32>(&TOURNAMENT_SIZE) as usize },
+        match params.value_of::<String>(&OPERATOR).as_str() {
+            "tournament" => {
+                Self::Tournament { size: params.value_of::<u32>(&TOURNAMENT_SIZE) as usize }
+            }
             "roulette" => Self::Roulette,
             "lin_rank" => Self::LinearRank,
             "nonlin_rank" => Self::NonlinearRank,

@@ -117,7 +117,7 @@ fn individuals_without_finite_fitness_are_neither_elite_nor_parents() {
 
 #[test]
 fn the_default_deviation_of_mutation_is_the_root_of_three_tenths() {
-    assert_eq!(Params::default().of::<f64>(&mutation::SIGMA), 0.3_f64.sqrt());
+    assert_eq!(Params::default().value_of::<f64>(&mutation::SIGMA), 0.3_f64.sqrt());
 }
 
 #[test]
