@@ -76,6 +76,7 @@ VARIANTS = {
     },
 }
 AS_IT_IS = "as it is"
+IN_FILE_NAMES = str.maketrans(" ", "-", ",'")
 
 
 def main():
@@ -126,7 +127,7 @@ def changed(experiment, changes):
 def stem_of(name, variant, seed):
     """The path of a run's files, without their endings."""
     folder = RESULTS / "hypotheses" / name
-    return folder / f"{variant.replace(' ', '-').replace(',', '')}-{seed}"
+    return folder / f"{variant.translate(IN_FILE_NAMES)}-{seed}"
 
 
 def report():
