@@ -2,9 +2,10 @@
 """Evolves experiments with one thing changed at a time, and prints the effects.
 
     results/hypotheses.py run [EXPERIMENT...] [--variants V...] [--seeds S...] [--workers N]
-    results/hypotheses.py report
+    results/hypotheses.py report [--update]
 
-EXPERIMENT is a name in the table below; `report` prints every experiment. `run` writes history and
+EXPERIMENT is a name in the table below. `report` prints the table of every experiment, or writes it into
+docs/notebook/2026-11-thesis.md. `run` writes history and
 champion of each run to results/hypotheses/EXPERIMENT/VARIANT-SEED.csv and .json, and leaves
 existing runs alone, so you may interrupt it. The variant `as it is` is the unchanged file, whose runs are in
 results/histories. Needs Python 3.9, and for `run` swarmctl in the PATH.
@@ -18,9 +19,9 @@ import statistics
 from pathlib import Path
 
 import algorithms
+from report import LAST, RESULTS, markdown, print_or_update
 
-RESULTS = algorithms.RESULTS
-LAST = 50
+PAGE = RESULTS.parent / "docs" / "notebook" / "2026-11-thesis.md"
 SEEDS = [0, 1, 2, 3, 4]
 
 GA = "algorithm.populations.p1.params."
@@ -87,10 +88,12 @@ def main():
     run.add_argument("--variants", nargs="+")
     run.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     run.add_argument("--workers", type=int, default=1)
-    commands.add_parser("report", help="print existing runs")
+    commands.add_parser("report", help="print existing runs").add_argument("--update", action="store_true")
     args = parser.parse_args()
     if args.command == "report":
-        report()
+        # Without runs, an experiment has no table.
+        for name in [name for name in VARIANTS if read(name, AS_IT_IS, 0)]:
+            print_or_update(PAGE, name, report(name))
         return
     for name in args.experiments:
         for variant, changes in VARIANTS[name].items():
@@ -130,17 +133,15 @@ def stem_of(name, variant, seed):
     return folder / f"{variant.translate(IN_FILE_NAMES)}-{seed}"
 
 
-def report():
-    for name, variants in VARIANTS.items():
-        print(f"## {name}\n")
-        print("| variant | seeds | mean, last 50 | champion |")
-        print("|---|---|---|---|")
-        for variant in [AS_IT_IS, *variants]:
-            runs = [run for seed in SEEDS if (run := read(name, variant, seed))]
-            if runs:
-                means, champions = zip(*runs)
-                print(f"| {variant} | {len(runs)} | {spread(means)} | {spread(champions)} |")
-        print()
+def report(name):
+    """The table of an experiment."""
+    rows = []
+    for variant in [AS_IT_IS, *VARIANTS[name]]:
+        runs = [run for seed in SEEDS if (run := read(name, variant, seed))]
+        if runs:
+            means, champions = zip(*runs)
+            rows.append([variant, len(runs), spread(means), spread(champions)])
+    return markdown(["variant", "seeds", "mean, last 50", "champion"], rows)
 
 
 def read(name, variant, seed):

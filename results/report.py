@@ -52,7 +52,7 @@ def read_csv(path):
 
 def print_or_update(page, name, text):
     """Prints a table; with `--update`, writes it into a page, between the marks with its name."""
-    if sys.argv[1:] != ["--update"]:
+    if "--update" not in sys.argv:
         print(text, end="")
         return
     begin, end = f"<!-- generated: {name} -->\n", f"<!-- end: {name} -->"
