@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::ops::Range;
 
-use pulp::{Simd, WithSimd};
+use determinism::simd::{Simd, WithSimd};
 
 use crate::lanes::Lanes;
 use crate::network::dynamics::NetworkState;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
-use pulp::{Simd, WithSimd};
+use determinism::simd::{Simd, WithSimd};
 
 use crate::torus::Vec2;
 use determinism::Isa;

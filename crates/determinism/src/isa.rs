@@ -4,48 +4,63 @@
 use std::fmt;
 use std::str::FromStr;
 
-use pulp::{Arch, WithSimd};
+use pulp::Arch;
+
+use crate::simd::{ByPulp, Portable, Simd, WithSimd};
 
 /// A level of vector instructions that this processor has.
 #[derive(Clone, Copy)]
-pub struct Isa(Arch);
+pub struct Isa(Level);
+
+#[derive(Clone, Copy)]
+enum Level {
+    /// Without a fused multiply-add.
+    Portable,
+    /// With one.
+    Fused(Arch),
+}
 
 impl Isa {
     /// The fastest level of this processor.
     pub fn best() -> Self {
-        Self(Arch::new())
+        *Self::available().last().expect("every processor has the portable level")
     }
 
     /// All levels of this processor, the slowest first.
     pub fn available() -> Vec<Self> {
-        let mut levels = vec![Arch::Scalar];
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        let fused = None;
         #[cfg(target_arch = "x86_64")]
-        {
-            levels.extend(pulp::x86::V3::try_new().map(Arch::V3));
-            levels.extend(pulp::x86::V4::try_new().map(Arch::V4));
-        }
+        let fused = {
+            let avx2 = pulp::x86::V3::try_new().map(Arch::V3);
+            avx2.into_iter().chain(pulp::x86::V4::try_new().map(Arch::V4))
+        };
         #[cfg(target_arch = "aarch64")]
-        levels.extend(pulp::aarch64::Neon::try_new().map(Arch::Neon));
-        levels.into_iter().map(Self).collect()
+        let fused = pulp::aarch64::Neon::try_new().map(Arch::Neon);
+        let levels = [Level::Portable].into_iter().chain(fused.into_iter().map(Level::Fused));
+        levels.map(Self).collect()
     }
 
     /// `portable`, `avx2` (with FMA), `avx512` or `neon`.
     pub fn name(self) -> &'static str {
         match self.0 {
-            Arch::Scalar => "portable",
+            Level::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
-            Arch::V3(_) => "avx2",
+            Level::Fused(Arch::V3(_)) => "avx2",
             #[cfg(target_arch = "x86_64")]
-            Arch::V4(_) => "avx512",
+            Level::Fused(Arch::V4(_)) => "avx512",
             #[cfg(target_arch = "aarch64")]
-            Arch::Neon(_) => "neon",
-            _ => "other",
+            Level::Fused(Arch::Neon(_)) => "neon",
+            Level::Fused(_) => "other",
         }
     }
 
     /// Runs an operation, compiled for this level.
     pub fn run<Op: WithSimd>(self, operation: Op) -> Op::Output {
-        self.0.dispatch(operation)
+        match self.0 {
+            Level::Portable => operation.with_simd(Portable),
+            Level::Fused(arch) => arch.dispatch(ByPulp(operation)),
+        }
     }
 
     /// Number of f32 lanes per vector.
@@ -53,7 +68,7 @@ impl Isa {
         struct VectorLen;
         impl WithSimd for VectorLen {
             type Output = usize;
-            fn with_simd<S: pulp::Simd>(self, _simd: S) -> usize {
+            fn with_simd<S: Simd>(self, _simd: S) -> usize {
                 S::F32_LANES
             }
         }

@@ -2,7 +2,8 @@
 //!
 //! - [`random`]: random streams, each addressed by its purpose;
 //! - [`Isa`]: the vector instructions of a computation. They change its speed, but no bit of its
-//!   results.
+//!   results;
+//! - [`simd`]: what these instructions compute, the same bits at every level.
 //!
 //! A stream's values depend on its address alone, not on the reader or the time of reading:
 //!
@@ -23,5 +24,6 @@
 
 mod isa;
 pub mod random;
+pub mod simd;
 
 pub use isa::{Isa, UnknownIsa};

@@ -20,7 +20,7 @@
 
 use std::fmt;
 
-use pulp::{Simd, WithSimd};
+use crate::simd::{Simd, WithSimd};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 

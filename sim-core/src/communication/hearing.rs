@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-use pulp::{Simd, WithSimd};
+use determinism::simd::{Simd, WithSimd};
 
 use super::antenna::{Antenna, Receiver};
 use crate::neighbours::Neighbours;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::LOG2_E;
 
-use pulp::{Simd, WithSimd};
+use determinism::simd::{Simd, WithSimd};
 
 use crate::blueprint::Lattice;
 use crate::exp2::exp2;

@@ -7,7 +7,7 @@
 //! previous step, and R = 1. With reward, both are activities of an earlier step, and R is the
 //! discounted sum of the rewards since then. Every lane has its own weights.
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::aligned::Aligned;
 use crate::blueprint::{PlasticSynapse, Plasticity};

@@ -3,7 +3,7 @@
 
 use std::mem;
 
-use pulp::{Simd, WithSimd};
+use determinism::simd::{Simd, WithSimd};
 
 use super::super::aligned::Aligned;
 use super::kernel::{Blocks, Coupling, Kernel};

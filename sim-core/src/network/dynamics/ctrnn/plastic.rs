@@ -6,7 +6,7 @@
 
 use std::mem;
 
-use pulp::{Simd, WithSimd};
+use determinism::simd::{Simd, WithSimd};
 
 use super::super::aligned::Aligned;
 use super::super::learning::{Memory, Rule};

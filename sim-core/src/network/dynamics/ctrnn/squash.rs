@@ -10,9 +10,9 @@
 
 use std::f64::consts::LOG2_E;
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
-use crate::exp2::{Exp2, exp2_parts};
+use crate::exp2::{Exp2, exp2_parts_of};
 use experiment_file::Activation;
 
 /// y for an argument of 1.
@@ -35,16 +35,12 @@ pub(super) fn squash<S: Simd, const W: usize, const N: usize>(
     match activation {
         Activation::Sigmoid => {
             for ([y0, y1], [u0, u1]) in pairs {
-                for vector in 0..W {
-                    [u0[vector], u1[vector]] = sigmoid(simd, y0[vector], y1[vector]);
-                }
+                [*u0, *u1] = sigmoid(simd, y0, y1);
             }
         }
         Activation::Tanh => {
             for ([y0, y1], [u0, u1]) in pairs {
-                for vector in 0..W {
-                    [u0[vector], u1[vector]] = tanh(simd, y0[vector], y1[vector]);
-                }
+                [*u0, *u1] = tanh(simd, y0, y1);
             }
         }
     }
@@ -52,45 +48,70 @@ pub(super) fn squash<S: Simd, const W: usize, const N: usize>(
 
 /// 1 / (1 + 2^y), twice.
 #[inline(always)]
-fn sigmoid<S: Simd>(simd: S, first: S::f32s, second: S::f32s) -> [S::f32s; 2] {
-    let a = one_plus_exp2(simd, first);
-    let b = one_plus_exp2(simd, second);
-    let inverse = simd.div_f32s(simd.splat_f32s(1.0), simd.mul_f32s(a, b));
-    [simd.mul_f32s(b, inverse), simd.mul_f32s(a, inverse)]
+fn sigmoid<S: Simd, const W: usize>(
+    simd: S,
+    first: &[S::f32s; W],
+    second: &[S::f32s; W],
+) -> [[S::f32s; W]; 2] {
+    let mut a = one_plus_exp2(simd, first);
+    let mut b = one_plus_exp2(simd, second);
+    for vector in 0..W {
+        let product = simd.mul_f32s(a[vector], b[vector]);
+        let inverse = simd.div_f32s(simd.splat_f32s(1.0), product);
+        (a[vector], b[vector]) =
+            (simd.mul_f32s(b[vector], inverse), simd.mul_f32s(a[vector], inverse));
+    }
+    [a, b]
 }
 
 #[inline(always)]
-fn one_plus_exp2<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
+fn one_plus_exp2<S: Simd, const W: usize>(simd: S, y: &[S::f32s; W]) -> [S::f32s; W] {
     let one = simd.splat_f32s(1.0);
-    let Exp2 { s, q, f } = exp2_parts(simd, y);
-    simd.mul_add_f32s(s, simd.mul_add_f32s(q, f, one), one)
+    let Exp2 { s, mut q, f } = exp2_parts_of(simd, y);
+    for vector in 0..W {
+        q[vector] = simd.mul_add_f32s(q[vector], f[vector], one);
+    }
+    for vector in 0..W {
+        q[vector] = simd.mul_add_f32s(s[vector], q[vector], one);
+    }
+    q
 }
 
 /// (2^y - 1) / (2^y + 1), twice.
 #[inline(always)]
-fn tanh<S: Simd>(simd: S, first: S::f32s, second: S::f32s) -> [S::f32s; 2] {
-    let above_a = exp2_minus_one(simd, first);
-    let above_b = exp2_minus_one(simd, second);
+fn tanh<S: Simd, const W: usize>(
+    simd: S,
+    first: &[S::f32s; W],
+    second: &[S::f32s; W],
+) -> [[S::f32s; W]; 2] {
+    let mut above_a = exp2_minus_one(simd, first);
+    let mut above_b = exp2_minus_one(simd, second);
     let two = simd.splat_f32s(2.0);
-    let a = simd.add_f32s(above_a, two);
-    let b = simd.add_f32s(above_b, two);
-    let inverse = simd.div_f32s(simd.splat_f32s(1.0), simd.mul_f32s(a, b));
-    [
-        simd.mul_f32s(above_a, simd.mul_f32s(b, inverse)),
-        simd.mul_f32s(above_b, simd.mul_f32s(a, inverse)),
-    ]
+    for vector in 0..W {
+        let a = simd.add_f32s(above_a[vector], two);
+        let b = simd.add_f32s(above_b[vector], two);
+        let inverse = simd.div_f32s(simd.splat_f32s(1.0), simd.mul_f32s(a, b));
+        above_a[vector] = simd.mul_f32s(above_a[vector], simd.mul_f32s(b, inverse));
+        above_b[vector] = simd.mul_f32s(above_b[vector], simd.mul_f32s(a, inverse));
+    }
+    [above_a, above_b]
 }
 
 /// Near y = 0, s is 1 and nothing cancels.
 #[inline(always)]
-fn exp2_minus_one<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
-    let Exp2 { s, q, f } = exp2_parts(simd, y);
-    simd.mul_add_f32s(s, simd.mul_f32s(q, f), simd.sub_f32s(s, simd.splat_f32s(1.0)))
+fn exp2_minus_one<S: Simd, const W: usize>(simd: S, y: &[S::f32s; W]) -> [S::f32s; W] {
+    let one = simd.splat_f32s(1.0);
+    let Exp2 { s, mut q, f } = exp2_parts_of(simd, y);
+    for vector in 0..W {
+        let above = simd.sub_f32s(s[vector], one);
+        q[vector] = simd.mul_add_f32s(s[vector], simd.mul_f32s(q[vector], f[vector]), above);
+    }
+    q
 }
 
 #[cfg(test)]
 mod tests {
-    use pulp::WithSimd;
+    use determinism::simd::{WithSimd, bytemuck};
 
     use super::*;
     use crate::exp2::MAX_EXPONENT;
@@ -110,12 +131,10 @@ mod tests {
             let lanes = self.y.chunks_exact(S::F32_LANES).flat_map(|y| {
                 let pair = [S::as_simd_f32s(y).0[0], simd.splat_f32s(self.other)];
                 let [u, other] = match self.activation {
-                    Activation::Sigmoid => sigmoid(simd, pair[0], pair[1]),
-                    Activation::Tanh => tanh(simd, pair[0], pair[1]),
+                    Activation::Sigmoid => sigmoid(simd, &[pair[0]], &[pair[1]]),
+                    Activation::Tanh => tanh(simd, &[pair[0]], &[pair[1]]),
                 };
-                let (u, other) = ([u], [other]);
-                let (u, other) =
-                    (pulp::bytemuck::cast_slice(&u), pulp::bytemuck::cast_slice(&other));
+                let (u, other) = (bytemuck::cast_slice(&u), bytemuck::cast_slice(&other));
                 let both = u.iter().zip(other).map(|(&u, &other): (&f32, &f32)| [u, other]);
                 both.collect::<Vec<_>>()
             });

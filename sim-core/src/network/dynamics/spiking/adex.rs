@@ -3,7 +3,7 @@
 //! 1, then v = V_reset; w += dt / tau_w (A (v - V_rest) - w + B tau_w s); theta += dt ((1 - s)
 //! (theta_rest - theta) / 50 + 20 s).
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::functions::exp;
 use super::model::{FLOOR, Model, Parameters};

@@ -1,6 +1,6 @@
 //! Computes the network in some vectors of lanes, substep by substep: synapses, then neurons.
 
-use pulp::{Simd, WithSimd};
+use determinism::simd::{Simd, WithSimd};
 
 use super::super::aligned::Aligned;
 use super::super::learning::Memory;

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::super::learning::Rule;
 use super::encoding::Encoders;

@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::super::aligned::Aligned;
 use super::functions::exp;
@@ -281,7 +281,7 @@ impl EncoderState {
 
 #[cfg(test)]
 mod tests {
-    use pulp::WithSimd;
+    use determinism::simd::{WithSimd, bytemuck};
 
     use super::*;
     use determinism::Isa;
@@ -322,7 +322,7 @@ mod tests {
                 for substep in 0..N_SUBSTEPS {
                     let (draws, lanes) = (&draws, 0..n_lanes);
                     encoders.encode::<S, 1>(simd, &mut state, draws, lanes, substep, &mut spikes);
-                    let rows: &[f32] = pulp::bytemuck::cast_slice(&spikes);
+                    let rows: &[f32] = bytemuck::cast_slice(&spikes);
                     trains.push(rows.iter().step_by(n_lanes).map(|&spike| spike > 0.0).collect());
                 }
             }

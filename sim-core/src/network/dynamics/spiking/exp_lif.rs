@@ -2,7 +2,7 @@
 //! tau (v_rest - v + 0.3 exp(v - thresh) + 0.6 I), at most 30 mV; at 30 mV a spike, then v =
 //! v_rest, and I = 0 for `time_refrac` substeps.
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::functions::exp;
 use super::lif::gate;

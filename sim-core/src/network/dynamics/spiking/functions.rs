@@ -5,7 +5,7 @@
 
 use std::f32::consts::LOG2_E;
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use crate::exp2::{Exp2, exp2, exp2_parts};
 
@@ -34,7 +34,7 @@ pub(super) fn cosh<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
 
 #[cfg(test)]
 mod tests {
-    use pulp::WithSimd;
+    use determinism::simd::{WithSimd, bytemuck};
 
     use super::*;
     use determinism::Isa;
@@ -49,7 +49,7 @@ mod tests {
             let lanes = self.0.chunks_exact(S::F32_LANES).flat_map(|x| {
                 let x = S::as_simd_f32s(x).0[0];
                 let all = [exp(simd, x), tanh(simd, x), cosh(simd, x)];
-                let all: &[f32] = pulp::bytemuck::cast_slice(&all);
+                let all: &[f32] = bytemuck::cast_slice(&all);
                 let lane = |i: usize| [0, 1, 2].map(|function| all[function * S::F32_LANES + i]);
                 (0..S::F32_LANES).map(lane).collect::<Vec<_>>()
             });

@@ -2,7 +2,7 @@
 //! v += dt (0.04 v^2 + 5 v + 140 - u + 0.1 I), within [-85, 30], and
 //! u += dt A (B v - u); a spike at 30 mV.
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::model::{Model, Parameters};
 

@@ -1,7 +1,7 @@
 //! Leaky integrate and fire: v += dt / tau (v_rest - v + R I), I = 0 for `time_refrac`
 //! substeps after a spike; a spike where v >= thresh, then v = v_rest.
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::model::{FLOOR, Model, Parameters};
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 /// The parameters of one neuron, by name.
 pub(super) type Parameters<'a> = &'a dyn Fn(&str) -> f64;

@@ -4,7 +4,7 @@
 //! [-85, 40]; n += dt phi (n_inf - n) / tau_n, at most all the way to n_inf; a spike in
 //! every substep that ends at 35.5 mV or more.
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::functions::{cosh, tanh};
 use super::model::{Model, Parameters};

@@ -9,7 +9,7 @@
 //! For each neuron: I = sum over receptors of gain * (W s) * (E - v), where the term of NMDA is
 //! divided by 1 + Mg2 exp(-0.062 v) / 3.57. Without E, the last factor is 1, and -1 for GABA.
 
-use pulp::Simd;
+use determinism::simd::Simd;
 
 use super::super::aligned::Aligned;
 use super::blueprint::links;
