@@ -10,7 +10,12 @@ use serde_json::json;
 use swarm_proto::v1::Experiment;
 use tokio::sync::oneshot;
 
-use crate::{error::Error, json, progress::Progress, text};
+use crate::{
+    error::{Code, Error},
+    json,
+    progress::Progress,
+    text,
+};
 
 /// Options of commands that change several experiments for good.
 #[derive(Debug, Args)]
@@ -61,10 +66,14 @@ impl Consent {
                 })?;
                 Ok(false)
             }
-            Next::Refuse => Err(Error::Input(format!(
-                "`{what}` would change {n}, and cannot be undone: confirm it with --yes, or list \
-                 them with --dry-run"
-            ))),
+            Next::Refuse => Err(Error::at(
+                Code::NeedsConsent,
+                "--yes",
+                format!(
+                    "`{what}` would change {n}, and cannot be undone: confirm it with --yes, or \
+                     list them with --dry-run"
+                ),
+            )),
             Next::Ask => {
                 progress.remark(&format!("{what} {n}? This cannot be undone. Type yes to go on:"));
                 match answer().await.trim() {

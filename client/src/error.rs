@@ -1,19 +1,27 @@
-//! The errors of commands: their messages and exit codes.
+//! The errors of commands: their messages, codes and places.
+
+mod answer;
+mod code;
 
 use std::{
     io,
     path::{Path, PathBuf},
 };
 
-use experiment_file::ConfigError;
+use experiment_file::{ConfigError, Problem};
 use model::store::StoreError;
-use swarm_telemetry::EXIT_STARVED;
 use swarm_transport::tls_diagnosis;
-use tonic::{Code, Status};
+use tonic::{Code as Grpc, Status};
 
 use crate::{
+    experiment_file::is_unreadable,
     file_kind::{self, Kind},
     text::{self, with_reason},
+};
+
+pub use self::{
+    answer::{Answer, wants_json},
+    code::Code,
 };
 
 /// Why a command did not succeed.
@@ -22,13 +30,23 @@ pub enum Error {
     /// Bad input; the message states the correct input.
     #[error("{0}")]
     Input(String),
+    /// Bad input of a kind that programs can tell apart.
+    #[error("{message}")]
+    At {
+        /// The kind.
+        code: Code,
+        /// A file, an option or a name.
+        place: String,
+        /// The problem with the place, and the correct input.
+        message: String,
+    },
     /// An experiment file with problems.
     #[error("{} is not a valid experiment file", file.display())]
     Config {
         /// The file.
         file: PathBuf,
-        /// The problems, one per line.
-        problems: String,
+        /// The problems.
+        problems: Vec<Problem>,
     },
     /// An error after some runs of a group were submitted.
     #[error(
@@ -55,9 +73,12 @@ pub enum Error {
         /// The first reason.
         cause: Box<Error>,
     },
-    /// No such experiment, or no champion.
+    /// No such experiment, generation or individual.
     #[error("{0}")]
     NotFound(String),
+    /// The state of the experiment does not allow the request.
+    #[error("{0}")]
+    WrongState(String),
     /// The coordinator did not answer within the patience.
     #[error(
         "cannot reach a coordinator at {address}: {reason}; start one with `coordinator`, or set \
@@ -86,8 +107,13 @@ pub enum Error {
         diagnosis: String,
     },
     /// The server at the address is not a coordinator, or does not know the request.
-    #[error("{0}")]
-    Foreign(String),
+    #[error("{message}")]
+    Foreign {
+        /// The address.
+        address: String,
+        /// The server's answer, and the remedy.
+        message: String,
+    },
     /// The experiment failed.
     #[error("{}", with_reason(&format!("experiment {id} failed"), reason))]
     Failed {
@@ -142,52 +168,103 @@ pub enum Error {
 impl Error {
     /// The error of an invalid experiment file.
     pub fn invalid(file: &Path, error: &ConfigError) -> Self {
-        Self::Config { file: file.into(), problems: error.to_string() }
+        Self::Config { file: file.into(), problems: error.problems.clone() }
+    }
+
+    /// Bad input of a kind, at a place, with a message that names the place.
+    pub fn at(code: Code, place: impl std::fmt::Display, message: impl Into<String>) -> Self {
+        Self::At { code, place: place.to_string(), message: message.into() }
+    }
+
+    /// The error of a file that cannot be read.
+    pub fn of_file(path: &Path, what: impl std::fmt::Display) -> Self {
+        let path = path.display();
+        Self::at(Code::UnreadableFile, &path, format!("{path}: {what}"))
     }
 
     /// The error that the server at the address is not a coordinator.
     pub fn foreign(address: &str, banner: &str) -> Self {
-        Self::Foreign(format!(
+        let message = format!(
             "the server at {address} is not a coordinator: it answers \"{banner}\"; is this the \
              right port?{}",
             if banner.starts_with("HTTP/") { PORTS } else { "" }
-        ))
+        );
+        Self::Foreign { address: address.into(), message }
     }
 
     /// Whether the same request for another experiment would fail for the same reason.
     pub fn concerns_all(&self) -> bool {
         matches!(
             self,
-            Self::Unreachable { .. } | Self::Denied { .. } | Self::Tls { .. } | Self::Foreign(_)
+            Self::Unreachable { .. }
+                | Self::Denied { .. }
+                | Self::Tls { .. }
+                | Self::Foreign { .. }
         )
+    }
+
+    /// Its code for programs.
+    pub fn code(&self) -> Code {
+        match self {
+            Self::At { code, .. } => *code,
+            Self::Internal(_) => Code::Internal,
+            Self::Write { .. } => Code::WriteFailed,
+            Self::Input(message) if leading_option(message).is_some() => Code::BadArgument,
+            Self::Input(_) => Code::BadInput,
+            Self::Config { problems, .. } if is_unreadable(problems) => Code::UnreadableFile,
+            Self::Config { .. } => Code::InvalidExperiment,
+            Self::Incomplete { cause, .. } | Self::Partly { cause, .. } => cause.code(),
+            Self::NotFound(_) => Code::NotFound,
+            Self::WrongState(_) => Code::WrongState,
+            Self::Unreachable { .. } => Code::Unreachable,
+            Self::Failed { .. } => Code::ExperimentFailed,
+            Self::Cancelled { .. } => Code::ExperimentCancelled,
+            Self::Denied { .. } => Code::TokenRefused,
+            Self::Tls { .. } => Code::NoTls,
+            Self::Foreign { .. } => Code::NotACoordinator,
+            Self::TimedOut { .. } => Code::NotEnded,
+            Self::Damaged(_) => Code::DatabaseDamaged,
+            Self::Flawed(_) => Code::ClaimFalse,
+            Self::Starved(_) => Code::MachineTooSmall,
+            Self::Interrupted(_) => Code::Interrupted,
+            Self::OutputClosed => Code::OutputClosed,
+        }
     }
 
     /// The exit code of `swarmctl`, as its help lists them.
     pub fn exit_code(&self) -> u8 {
+        self.code().exit_code()
+    }
+
+    /// What it is about, for programs: a file, an option, an experiment or an address.
+    pub fn place(&self) -> Option<String> {
         match self {
-            Self::Write { .. } | Self::Internal(_) => 1,
-            Self::Input(_) | Self::Config { .. } => 2,
-            Self::Incomplete { cause, .. } | Self::Partly { cause, .. } => cause.exit_code(),
-            Self::NotFound(_) => 3,
-            Self::Unreachable { .. } => 4,
-            Self::Failed { .. } => 5,
-            Self::Cancelled { .. } => 6,
-            Self::Denied { .. } => 7,
-            Self::Tls { .. } => 8,
-            Self::Foreign(_) => 9,
-            Self::TimedOut { .. } => 10,
-            Self::Damaged(_) => 11,
-            Self::Flawed(_) => 12,
-            Self::Starved(_) => EXIT_STARVED,
-            Self::Interrupted(_) => 130,
-            Self::OutputClosed => 141,
+            Self::At { place, .. } => Some(place.clone()),
+            Self::Input(message) => leading_option(message).map(str::to_owned),
+            Self::Config { file, problems } => Some(match &problems[..] {
+                [one] => answer::line_of(file, one.line),
+                _ => file.display().to_string(),
+            }),
+            Self::Incomplete { cause, .. } | Self::Partly { cause, .. } => cause.place(),
+            Self::Unreachable { address, .. }
+            | Self::Denied { address, .. }
+            | Self::Tls { address, .. }
+            | Self::Foreign { address, .. } => Some(address.clone()),
+            Self::Failed { id, .. } | Self::Cancelled { id, .. } | Self::TimedOut { id } => {
+                Some(id.to_string())
+            }
+            Self::Write { what, .. } => Some(what.clone()),
+            _ => None,
         }
     }
 
     /// The report for standard error.
     pub fn report(&self) -> String {
         match self {
-            Self::Config { file, problems } => prefix_lines(problems, &file.display()),
+            Self::Config { file, problems } => {
+                let lines = problems.iter().map(|problem| format!("{}: {problem}", file.display()));
+                lines.collect::<Vec<_>>().join("\n")
+            }
             Self::Interrupted(_) | Self::OutputClosed => self.to_string(),
             _ => format!("error: {self}"),
         }
@@ -218,17 +295,18 @@ impl Error {
 
     /// The error that a path is no data directory: names its kind, or else is `text`.
     fn no_data_directory(path: &Path, text: String) -> Self {
-        Self::Input(match file_kind::expect(path, &[Kind::DataDirectory], "a data directory") {
+        let message = match file_kind::expect(path, &[Kind::DataDirectory], "a data directory") {
             Err(other) => format!("{}: {other}", path.display()),
             Ok(()) => text,
-        })
+        };
+        Self::at(Code::NoDataDirectory, path.display(), message)
     }
 
     /// The error of a failed call to the services on a data directory.
     pub fn from_status_here(status: &Status, data_dir: &str) -> Self {
         match status.code() {
-            Code::ResourceExhausted => Self::Input(status.message().into()),
-            Code::Unavailable | Code::Internal | Code::Unknown => {
+            Grpc::ResourceExhausted => Self::Input(status.message().into()),
+            Grpc::Unavailable | Grpc::Internal | Grpc::Unknown => {
                 Self::Internal(format!("{data_dir}: {}", reason(status)))
             }
             _ => Self::from_status(status, data_dir),
@@ -250,22 +328,29 @@ impl Error {
             return Self::Tls { address: address.into(), diagnosis };
         }
         match status.code() {
-            _ if is_no_grpc(status) => Self::Foreign(format!(
-                "the server at {address} is not a coordinator: it does not speak gRPC; is this \
-                 the right port?{PORTS}"
-            )),
+            _ if is_no_grpc(status) => Self::Foreign {
+                address: address.into(),
+                message: format!(
+                    "the server at {address} is not a coordinator: it does not speak gRPC; is this \
+                     the right port?{PORTS}"
+                ),
+            },
             _ if is_transport(status) => {
                 Self::Unreachable { address: address.into(), reason: reason(status) }
             }
-            Code::Unimplemented => Self::Foreign(format!(
-                "the coordinator at {address} does not know this request; it is of another version \
-                 than this swarmctl ({}), or another service",
-                env!("CARGO_PKG_VERSION")
-            )),
-            Code::NotFound | Code::FailedPrecondition => Self::NotFound(message.into()),
-            Code::InvalidArgument => Self::Input(message.into()),
-            Code::DataLoss => Self::Damaged(message.into()),
-            Code::Unauthenticated | Code::PermissionDenied => {
+            Grpc::Unimplemented => Self::Foreign {
+                address: address.into(),
+                message: format!(
+                    "the coordinator at {address} does not know this request; it is of another \
+                     version than this swarmctl ({}), or another service",
+                    env!("CARGO_PKG_VERSION")
+                ),
+            },
+            Grpc::NotFound => Self::NotFound(message.into()),
+            Grpc::FailedPrecondition => Self::WrongState(message.into()),
+            Grpc::InvalidArgument => Self::Input(message.into()),
+            Grpc::DataLoss => Self::Damaged(message.into()),
+            Grpc::Unauthenticated | Grpc::PermissionDenied => {
                 Self::Denied { address: address.into(), refusal: message.into() }
             }
             code => {
@@ -282,7 +367,7 @@ pub fn is_transient(status: &Status) -> bool {
     if tls_diagnosis(status).is_some() {
         return false;
     }
-    is_transport(status) || matches!(code, Code::Aborted | Code::ResourceExhausted)
+    is_transport(status) || matches!(code, Grpc::Aborted | Grpc::ResourceExhausted)
 }
 
 /// The other servers that speak HTTP.
@@ -302,7 +387,7 @@ fn is_no_grpc(status: &Status) -> bool {
 fn is_transport(status: &Status) -> bool {
     let code = status.code();
     std::error::Error::source(status).is_some()
-        || matches!(code, Code::Unavailable | Code::DeadlineExceeded)
+        || matches!(code, Grpc::Unavailable | Grpc::DeadlineExceeded)
 }
 
 /// The deepest cause, which is the most specific.
@@ -314,6 +399,12 @@ pub fn reason(status: &Status) -> String {
         source = cause.source();
     }
     if text.is_empty() { status.code().description().into() } else { text }
+}
+
+/// The option with which a message begins, such as `--set` in "--set a.b: no such key".
+fn leading_option(message: &str) -> Option<&str> {
+    let word = message.split_whitespace().next()?.trim_end_matches([':', ',']);
+    word.starts_with("--").then_some(word)
 }
 
 /// A text with a prefix before each line.
@@ -376,7 +467,8 @@ mod tests {
     #[test]
     fn every_problem_of_a_file_has_its_line() {
         let file = PathBuf::from("a.json");
-        let error = Error::Config { file, problems: "line 3: x\nworld: y".into() };
+        let problems = ["line 3: x", "world: y"].map(Problem::parse).into();
+        let error = Error::Config { file, problems };
         assert_eq!(error.report(), "a.json: line 3: x\na.json: world: y");
         assert_eq!(error.exit_code(), 2);
     }
@@ -390,7 +482,7 @@ mod tests {
             "{narrow}"
         );
         assert_eq!(error.report_within(None), error.report());
-        let problems = "line 3: this is longer than forty characters are".into();
+        let problems = vec![Problem::parse("line 3: this is longer than forty characters are")];
         let error = Error::Config { file: "a.json".into(), problems };
         assert_eq!(error.report_within(Some(40)), error.report());
     }

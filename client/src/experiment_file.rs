@@ -19,6 +19,18 @@ use crate::{
     interrupt, json,
 };
 
+/// The beginning of the problem of a file that cannot be read.
+const UNREADABLE: &str = "cannot be read: ";
+
+/// Whether these are the problems of a file that cannot be read, or is of another kind.
+pub fn is_unreadable(problems: &[Problem]) -> bool {
+    let is_whole = |problem: &Problem| problem.path.is_empty() && problem.line.is_none();
+    let begins = |problem: &Problem| {
+        [UNREADABLE, file_kind::OTHER].iter().any(|start| problem.message.starts_with(start))
+    };
+    matches!(problems, [one] if is_whole(one) && begins(one))
+}
+
 /// The text of an experiment file.
 #[derive(Debug, Clone)]
 pub struct ExperimentFile {
@@ -74,7 +86,7 @@ impl ExperimentFile {
             problems: vec![Problem {
                 path: path.into(),
                 line: None,
-                message: format!("cannot be read: {what}"),
+                message: format!("{UNREADABLE}{what}"),
             }],
         };
         file_kind::expect(path, &[Kind::Experiment], "an experiment file")
@@ -157,7 +169,14 @@ impl ExperimentFile {
     /// Adds the name of this file to a coordinator's error about it.
     pub fn locate(&self, error: Error) -> Error {
         match error {
-            Error::Input(problems) => Error::Config { file: self.path.clone(), problems },
+            Error::Input(problems) => {
+                let mut problems: Vec<Problem> = problems.lines().map(Problem::parse).collect();
+                // It was made from another file, or in one line.
+                if !self.text.trim_end().contains('\n') {
+                    problems.iter_mut().for_each(|problem| problem.line = None);
+                }
+                Error::Config { file: self.path.clone(), problems }
+            }
             error => error,
         }
     }

@@ -3,7 +3,12 @@
 use experiment_file::suggestion;
 use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
-use crate::{connection::Connection, error::Error, file_kind, subject::Subject};
+use crate::{
+    connection::Connection,
+    error::{Code, Error},
+    file_kind,
+    subject::Subject,
+};
 
 /// Number of experiments in one answer: far below the limit of a message.
 const PAGE_LEN: u32 = 2_000;
@@ -85,11 +90,12 @@ fn unknown(name: &str, all: &[Experiment]) -> Error {
     names.sort_unstable();
     names.dedup();
     let what = format!("no group or experiment is named `{name}`");
-    Error::NotFound(match file_kind::of_word(name) {
+    let message = match file_kind::of_word(name) {
         Some(file) => format!("{what}, and {file}"),
         None if names.is_empty() => format!("{what}: no experiment exists"),
         None => format!("{what}; {}", suggestion(name, &names)),
-    })
+    };
+    Error::at(Code::NotFound, name, message)
 }
 
 /// The error that a name is ambiguous.
@@ -98,5 +104,7 @@ fn several(name: &str, experiments: &[Experiment]) -> Error {
         experiments.iter().take(10).map(|experiment| experiment.id.to_string()).collect();
     let more = if experiments.len() > ids.len() { ", ..." } else { "" };
     let ids = ids.join(", ");
-    Error::Input(format!("`{name}` is the name of several experiments: {ids}{more}; give a number"))
+    let message =
+        format!("`{name}` is the name of several experiments: {ids}{more}; give a number");
+    Error::at(Code::AmbiguousName, name, message)
 }

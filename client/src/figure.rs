@@ -7,7 +7,10 @@ pub use draw::{FONT, embed_font};
 
 use std::path::Path;
 
-use crate::{error::Error, output_file::Overwrite};
+use crate::{
+    error::{Code, Error},
+    output_file::Overwrite,
+};
 
 /// Maximum number of curves of a figure: more would be indistinguishable.
 pub const CURVES_MAX: usize = 14;
@@ -67,10 +70,11 @@ impl Format {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
-            _ => Err(Error::Input(format!(
-                "{}: a figure's name ends in .svg or .png",
-                path.display()
-            ))),
+            _ => Err(Error::at(
+                Code::BadArgument,
+                path.display(),
+                format!("{}: a figure's name ends in .svg or .png", path.display()),
+            )),
         }
     }
 }

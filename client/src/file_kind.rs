@@ -14,6 +14,8 @@ use crate::{
     text::shell_command,
 };
 
+/// The beginning of the message about a file of another kind.
+pub const OTHER: &str = "it is ";
 /// Bytes that suffice to recognise files that are not JSON.
 const HEAD_LEN: u64 = 512;
 
@@ -191,7 +193,7 @@ pub fn expect(path: &Path, kinds: &[Kind], expected: &str) -> Result<(), String>
     match Kind::of_path(path).filter(|kind| !kinds.contains(kind)) {
         None => Ok(()),
         Some(kind) => Err(format!(
-            "it is {}, and {expected} is expected here; {}",
+            "{OTHER}{}, and {expected} is expected here; {}",
             kind.name(),
             kind.next_step(path)
         )),

@@ -9,7 +9,7 @@ use swarm_proto::v1::{
 use crate::{
     address::NamedAddress,
     connection::{Connection, present},
-    error::Error,
+    error::{Code, Error},
     subject::Subject,
 };
 
@@ -59,9 +59,10 @@ impl Connection {
     /// The genotype at an address, and its experiment.
     pub async fn genotype(&self, address: Address) -> Result<Found, Error> {
         if let Who::Generation(_) = address.who {
-            return Err(Error::Input(format!(
+            let message = format!(
                 "`{address}` is a whole generation; name one individual, such as {address}/0"
-            )));
+            );
+            return Err(Error::at(Code::BadArgument, address, message));
         }
         let (experiment, config_json) = self.stored(address.experiment.0).await?;
         let answer = self.individuals(address, 0).await?;

@@ -4,7 +4,12 @@
 use swarm_proto::v1::{Experiment, ExperimentState};
 
 use crate::{
-    args::Target, connection::Connection, error::Error, progress::Progress, subject::Subject, text,
+    args::Target,
+    connection::Connection,
+    error::{Code, Error},
+    progress::Progress,
+    subject::Subject,
+    text,
 };
 
 /// The outcome of a change.
@@ -41,7 +46,7 @@ pub async fn members(
         members.retain(|experiment| applies(experiment.state()));
     }
     match members.is_empty() {
-        true => Err(Error::NotFound(why_none.replace("NAME", name))),
+        true => Err(Error::at(Code::WrongState, name, why_none.replace("NAME", name))),
         false => Ok(members),
     }
 }

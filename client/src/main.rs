@@ -3,6 +3,7 @@
 //! and checks files and simulates trials without a coordinator.
 
 mod address;
+mod answers;
 mod args;
 mod change;
 mod cli;
@@ -58,8 +59,9 @@ use swarm_telemetry::{block_on, report, runtime};
 
 use crate::{
     cli::Args,
-    error::Error,
+    error::{Answer, Error, wants_json},
     local::services::{PROGRAMS, Program},
+    output_format::OutputFormat,
     progress::Progress,
     synonyms::with_suggestions,
 };
@@ -72,6 +74,7 @@ fn main() -> ExitCode {
     CompleteEnv::with_factory(Args::command).complete();
     let args = help::matches().and_then(|matches| Args::from_arg_matches(&matches));
     let args = args.unwrap_or_else(|error| end(&with_suggestions(error)));
+    let output = args.output;
     let result = match runtime(0) {
         Ok(runtime) => {
             let progress = Progress::new(args.output).with_details(args.verbose);
@@ -81,8 +84,16 @@ fn main() -> ExitCode {
         Err(starved) => Err(starved.into()),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
-    report(&error.report_within(table::stderr_width()));
+    report_error(&error, output);
     error.exit_code().into()
+}
+
+/// Writes an error to standard error: for people, or for programs as one JSON object.
+fn report_error(error: &Error, output: OutputFormat) {
+    report(&match output {
+        OutputFormat::Json => json::line(&Answer::from(error)),
+        _ => error.report_within(table::stderr_width()),
+    });
 }
 
 /// The program that a command line selects, with its arguments; none for `swarmctl`. The name of
@@ -99,10 +110,14 @@ fn other_program(words: Vec<OsString>) -> Option<(Program, Vec<OsString>)> {
 
 /// Ends with an error of the command line, or with help.
 fn end(answer: &clap::Error) -> ! {
+    if answer.use_stderr() && wants_json(env::args_os()) {
+        report(&json::line(&Answer::to_usage(answer)));
+        std::process::exit(answer.exit_code());
+    }
     let code = match answer.print() {
         Err(source) if !answer.use_stderr() => {
             let error = Error::from_stdout(source);
-            report(&error.report_within(table::stderr_width()));
+            report_error(&error, OutputFormat::Table);
             error.exit_code().into()
         }
         // If standard error is closed, the exit code says enough.

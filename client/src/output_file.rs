@@ -11,7 +11,10 @@ use clap::Args;
 use model::store;
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-use crate::{error::Error, interrupt::Unfinished};
+use crate::{
+    error::{Code, Error},
+    interrupt::Unfinished,
+};
 
 /// The name of a file or directory until it is complete.
 const UNFINISHED: &str = ".unfinished-";
@@ -235,10 +238,9 @@ impl OutputFiles {
 
 /// The error that a file exists.
 pub fn exists(path: &Path) -> Error {
-    Error::Input(format!(
-        "{} exists already; choose another name, or replace it with --force",
-        path.display()
-    ))
+    let path = path.display();
+    let message = format!("{path} exists already; choose another name, or replace it with --force");
+    Error::at(Code::FileExists, path, message)
 }
 
 /// The error that a file cannot be written.
@@ -246,7 +248,8 @@ pub fn unwritable(path: &Path, error: &io::Error) -> Error {
     // The name of an unfinished file would not help the user.
     let is_plain = error.get_ref().is_none() || error.kind() == ErrorKind::Other;
     let cause = if is_plain { error.to_string() } else { error.kind().to_string() };
-    Error::Input(format!("cannot write {}: {cause}", path.display()))
+    let path = path.display();
+    Error::at(Code::UnwritableFile, &path, format!("cannot write {path}: {cause}"))
 }
 
 /// The directory of a path.

@@ -12,7 +12,7 @@ use tokio::{net::TcpStream, time::timeout};
 
 use crate::{
     defaults::{DEFAULT_DATA_DIR, DEFAULT_LISTEN},
-    error::Error,
+    error::{Code, Error},
     settings::{COORDINATOR_VARIABLE, Settings},
 };
 
@@ -86,8 +86,10 @@ impl Place {
         if let Some(directory) = directory {
             let of_environment = env::var(COORDINATOR_VARIABLE).ok();
             return match settings.coordinator {
-                Some(named) if Some(&named) != of_environment.as_ref() => Err(Error::Input(
-                    "give --coordinator or --data-dir: a command works in one place".into(),
+                Some(named) if Some(&named) != of_environment.as_ref() => Err(Error::at(
+                    Code::BadArgument,
+                    "--data-dir",
+                    "give --coordinator or --data-dir: a command works in one place",
                 )),
                 _ => Ok(directory),
             };

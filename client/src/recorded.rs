@@ -94,7 +94,7 @@ impl Run {
         let function = fitness_function(&stored.config_json);
         match (Self { function, ..Self::new(experiment.name, source.clone(), generations) }) {
             run if run.points.is_empty() => {
-                Err(Error::NotFound(format!("{source} has no complete generation yet")))
+                Err(Error::WrongState(format!("{source} has no complete generation yet")))
             }
             run => Ok(run),
         }
@@ -102,7 +102,7 @@ impl Run {
 
     /// A history in a file.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
+        let problem = |problem: String| Error::of_file(path, problem);
         file_kind::expect(path, &[Kind::History], "the history of a run").map_err(problem)?;
         let text = read_text(path, TABLE_BYTES).map_err(|error| problem(error.to_string()))?;
         let mut reader = csv::Reader::from_reader(text.as_bytes());

@@ -12,7 +12,7 @@ use swarm_transport::{CredentialArgs, Credentials};
 
 use crate::{
     defaults::DEFAULT_COORDINATOR,
-    error::Error,
+    error::{Code, Error},
     input::{SETTINGS_BYTES, read_text},
 };
 
@@ -93,10 +93,9 @@ impl Settings {
                 return Ok(this);
             }
             Err(error) => {
-                return Err(Error::Input(format!(
-                    "cannot read the settings in {}: {error}; {REMEDY}",
-                    path.display()
-                )));
+                let path = path.display();
+                let message = format!("cannot read the settings in {path}: {error}; {REMEDY}");
+                return Err(Error::at(Code::UnreadableFile, path, message));
             }
         };
         if env::var_os(TOKEN_VARIABLE).is_some() {
@@ -178,7 +177,9 @@ fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
             let place = format!(" at line {} column {}", error.line(), error.column());
             let message = error.to_string();
             let message = message.strip_suffix(&place).unwrap_or(&message);
-            Error::Input(format!("{}: line {}: {message}; {REMEDY}", path.display(), error.line()))
+            let (path, line) = (path.display(), error.line());
+            let message = format!("{path}: line {line}: {message}; {REMEDY}");
+            Error::at(Code::UnreadableFile, format!("{path}:{line}"), message)
         })?;
     Ok(file.within(path.parent().unwrap_or(Path::new(""))))
 }

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import subprocess
 import sys
 import time
 
@@ -13,8 +14,9 @@ from processes import fleet
 
 from swarmevo.agents import server
 from swarmevo.agents.answers import CHARACTERS_MAX
-from swarmevo.agents.failures import CODES, NEXT
+from swarmevo.agents.failures import STEPS, of_program
 from swarmevo.agents.parameters import Budgets
+from swarmevo.agents.program import swarmctl
 from swarmevo.agents.serving import server as served
 
 DEFAULT = {"docs", "examples", "schema", "validate", "experiments", "explain", "follow", "history", "individual", "compare",
@@ -71,8 +73,15 @@ def test_calls_that_it_does_not_understand_are_explained(tmp_path):
     drive(server(tmp_path), script)
 
 
-def test_every_code_has_a_next_step():
-    assert set(CODES.values()) == set(NEXT)
+def test_the_steps_are_for_codes_of_the_program():
+    schema = json.loads(subprocess.run([swarmctl(), "schema", "--of", "error"], capture_output=True, check=True).stdout)
+    assert set(STEPS) <= {it["const"] for it in schema["$defs"]["Code"]["oneOf"]}
+
+
+def test_a_program_that_ends_without_an_error_is_a_bug():
+    for stderr in ("", "killed\n", '{"error": 3}\n', "[1]\n"):
+        failure = of_program(-9, stderr, "a.json")
+        assert failure.code == "internal" and failure.where == "a.json" and "-9" in failure.message
 
 
 def test_examples_schema_and_manual_answer_questions(tmp_path):
@@ -88,9 +97,10 @@ def test_examples_schema_and_manual_answer_questions(tmp_path):
         top = await call.facts("schema")
         assert {"world", "topology", "algorithm"} <= set(top["below"])
         size = await call.facts("schema", key="algorithm.population_size")
-        assert size["type"] == "integer" and size["minimum"] >= 1 and "individuals" in size["description"].lower()
+        assert size["types"] == ["integer"] and size["minimum"] >= 1 and "individuals" in size["description"].lower()
         assert (await call.facts("schema", key="world.objects.my_robots.num_instances"))["description"]
-        assert "did you mean 'population_size'" in (await call.error("schema", key="algorithm.population_sise"))["message"]
+        error = await call.error("schema", key="algorithm.population_sise")
+        assert error["code"] == "unknown_key" and "did you mean `population_size`" in error["message"]
         pages = (await call.facts("docs"))["pages"]
         assert "the-language" in pages["tasks"] and "agents" in pages
         for page, sections in pages.items():
@@ -117,7 +127,7 @@ def test_a_draft_is_validated_mended_and_never_replaces_a_file_of_a_person(tmp_p
         problems = [it["message"] for it in wrong["problems"]]
         assert not wrong["ok"] and len(problems) >= 2 and any("wrld" in it for it in problems)
         error = await call.error("run", file="mine.json")
-        assert error["code"] == "bad_experiment_file" and "brightness" in error["message"] and "validate" in error["next"]
+        assert error["code"] == "invalid_experiment" and "brightness" in error["message"] and "validate" in error["next"]
         right = await call.facts("draft", name="mine", task="aggregation", script=WRONG.replace("brightness(world)", "1").replace("wrld", "world"))
         assert not right["ok"], "the example's sensor needs `sense`"
         right = await call.facts("draft", name="mine", task="aggregation", changes={"world.objects.robot.num_instances": 7})
@@ -259,7 +269,7 @@ def test_a_bundle_is_exported_once_and_verified(ran):
         assert {"chain", "champion", "simulation"} <= {it["claim"] for it in proven["proven"]}
         whole = (ran / "proof.zip").read_bytes()
         (ran / "forged.zip").write_bytes(whole[:-200])
-        assert (await call.error("verify", file="forged.zip"))["code"] in ("bad_input", "claim_false")
+        assert (await call.error("verify", file="forged.zip"))["code"] in ("unreadable_file", "claim_false")
 
     drive(server(ran), script)
 

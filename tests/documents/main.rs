@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod algorithms;
+mod errors;
 mod keys;
 mod logs;
 mod metrics;

@@ -176,8 +176,11 @@ pub struct Outcome {
     pub code: Option<i32>,
     /// Standard output.
     pub stdout: String,
-    /// Standard error.
+    /// Standard error. Of a command for programs, with the message of its error instead of the
+    /// JSON object.
     pub stderr: String,
+    /// The error of a command for programs.
+    pub error: Option<Value>,
 }
 
 impl Outcome {
@@ -188,7 +191,24 @@ impl Outcome {
             code: output.status.code(),
             stdout: String::from_utf8(output.stdout).expect("UTF-8"),
             stderr: String::from_utf8(output.stderr).expect("UTF-8"),
+            error: None,
         }
+        .with_error()
+    }
+
+    /// Takes the error for programs out of standard error, where it is the last line.
+    fn with_error(mut self) -> Self {
+        let lines: Vec<&str> = self.stderr.lines().collect();
+        let Some((last, remarks)) = lines.split_last() else { return self };
+        let Ok(mut answer) = serde_json::from_str::<Value>(last) else { return self };
+        let error = answer.get_mut("error").map(Value::take).unwrap_or_default();
+        let Some(message) = error["message"].as_str() else { return self };
+        let is_of_lines = error["mistakes"].is_array() || message.contains(": cannot be read: ");
+        let prefix = if is_of_lines { "" } else { "error: " };
+        let lines: Vec<String> = remarks.iter().map(|line| format!("{line}\n")).collect();
+        self.stderr = format!("{}{prefix}{message}\n", lines.concat());
+        self.error = Some(error);
+        self
     }
 
     /// Panics unless the command succeeded.

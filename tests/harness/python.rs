@@ -143,7 +143,12 @@ impl RunningPythonClient {
         let mut errors = self.child.stderr.take().expect("piped");
         errors.read_to_string(&mut stderr).expect("UTF-8");
         let status = self.child.wait().expect("a child can be waited for");
-        Outcome { code: status.code(), stdout: std::mem::take(&mut self.stdout), stderr }
+        Outcome {
+            code: status.code(),
+            stdout: std::mem::take(&mut self.stdout),
+            stderr,
+            error: None,
+        }
     }
 }
 

@@ -60,6 +60,6 @@ impl Terminal {
         let output = child.wait_with_output().expect("script ends");
         let seen = String::from_utf8(output.stdout).expect("UTF-8").replace("\r\n", "\n");
         let stderr = String::from_utf8(output.stderr).expect("UTF-8");
-        Outcome { code: output.status.code(), stdout: seen, stderr }
+        Outcome { code: output.status.code(), stdout: seen, stderr, error: None }
     }
 }

@@ -17,7 +17,7 @@ use crate::{
     error::Error,
     file_kind::{self, Kind},
     json,
-    output_file::Overwrite,
+    output_file::{Overwrite, unwritable},
     progress::Progress,
     remote::Remote,
     subject::Subject,
@@ -126,7 +126,7 @@ async fn events(
     let name = experiment.name.chars().map(|c| if is_plain(c) { c } else { '_' });
     let run: String = name.take(80).collect::<String>() + &format!("-{id}");
     let run = directory.join(run);
-    let failed = |source| Error::Input(format!("cannot make {}: {source}", run.display()));
+    let failed = |source| unwritable(&run, &source);
     fs::create_dir_all(&run).map_err(failed)?;
     let name = format!("events.out.tfevents.{}.swarmevo", experiment.submitted_at_ms / 1000);
     Ok((run.join(name), file.into_bytes()))
@@ -134,7 +134,7 @@ async fn events(
 
 /// Reads a bundle from an untrusted source, up to the size limit of bundles.
 pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    let failed = |source: io::Error| Error::Input(format!("{}: {source}", path.display()));
+    let failed = |source: io::Error| Error::of_file(path, source);
     file_kind::expect(path, &[Kind::Bundle], "a bundle")
         .map_err(|what| failed(io::Error::other(what)))?;
     let mut bytes = Vec::new();

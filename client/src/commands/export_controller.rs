@@ -12,7 +12,7 @@ use sim_core::{FINGERPRINT, TrialSet};
 use super::subject::{Subject, SubjectArgs};
 use crate::{
     args::whole,
-    error::Error,
+    error::{Code, Error},
     experiment_file::{Compiled, Overrides},
     json,
     output_file::Overwrite,
@@ -115,7 +115,9 @@ pub async fn export_controller(
     let output = args.overwrite.begin_files(&args.to, args.language.names())?;
     let genes = &genotype.genes;
     let trial_set = TrialSet::Generation(args.generation.unwrap_or(generation));
-    let unfit = |error: &dyn std::fmt::Display| Error::Input(format!("{genotype}: {error}"));
+    let unfit = |error: &dyn std::fmt::Display| {
+        Error::at(Code::BadGenotype, genotype.place(), format!("{genotype}: {error}"))
+    };
     let Controller { files, robot_steps } = match args.language {
         Language::C => {
             let episodes = Episodes {

@@ -35,7 +35,7 @@ impl Remote for ImportArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let bytes = export::read(&self.file)?;
         let imported = connection.import(&bytes).await.map_err(|error| match error {
-            Error::Input(what) => Error::Input(format!("{}: {what}", self.file.display())),
+            Error::Input(what) => Error::of_file(&self.file, what),
             error => error,
         });
         let (experiment, is_new) = imported?;

@@ -30,7 +30,7 @@ mod plot;
 mod reordered;
 mod replay;
 mod run;
-mod schema;
+pub mod schema;
 mod simulate;
 mod subject;
 pub mod submit;
@@ -46,7 +46,7 @@ use tokio_util::sync::CancellationToken;
 use crate::{
     cli::Args,
     connection::Connection,
-    error::Error,
+    error::{Code, Error},
     interrupt,
     local::services::serve_referee,
     output_format::OutputFormat,
@@ -111,10 +111,11 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
     let Args { settings, output, command, .. } = args;
     let has_table = matches!(&command, Command::Remote(command) if command.has_table());
     if output == OutputFormat::Csv && !has_table {
-        return Err(Error::Input(
+        return Err(Error::at(
+            Code::BadArgument,
+            "--output",
             "`--output csv` is for tables: history, list and workers; this command has table, \
-             wide and json"
-                .into(),
+             wide and json",
         ));
     }
     if matches!(&command, Command::Remote(command) if command.ends_with_reader()) {
@@ -125,7 +126,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Validate(args) => return validate::validate(&args, &mut progress),
         Command::New(args) => return new::new(&args, &mut progress),
         Command::Examples(_) => return examples::examples(&mut progress),
-        Command::Schema(_) => return schema::schema(&mut progress),
+        Command::Schema(args) => return schema::schema(&args, &mut progress),
         Command::Simulate(args) => {
             return simulate::simulate(settings, &args, &mut progress).await;
         }

@@ -14,7 +14,7 @@ use super::subject::{Subject, SubjectArgs};
 use crate::{
     args::{SeedArg, StepsArg, whole},
     change::{Change, SetArg},
-    error::Error,
+    error::{Code, Error},
     experiment_file::Overrides,
     output_file::Overwrite,
     progress::Progress,
@@ -172,7 +172,10 @@ enum Format {
 
 fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> {
     let replay = Replay::simulate(episode).map_err(|error| match error {
-        ReplayError::Evaluate(error) => Error::Input(format!("{}: {error}", episode.name)),
+        ReplayError::Evaluate(error) => {
+            let message = format!("{}: {error}", episode.name);
+            Error::at(Code::BadGenotype, episode.name, message)
+        }
         error => Error::Input(error.to_string()),
     })?;
     Ok(replay_file(&match trials {
@@ -213,9 +216,8 @@ impl ReplayArgs {
             Some("svg") => Format::Svg,
             _ => {
                 let path = path.display();
-                return Err(Error::Input(format!(
-                    "{path}: the name must end in .html, .png or .svg"
-                )));
+                let message = format!("{path}: the name must end in .html, .png or .svg");
+                return Err(Error::at(Code::BadArgument, path, message));
             }
         };
         if format == Format::Html

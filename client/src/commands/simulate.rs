@@ -13,7 +13,7 @@ use sim_core::{EpisodeSummary, EvaluateError, MeasureName, Measures};
 
 use crate::{
     connection::Connection,
-    error::Error,
+    error::{Code, Error},
     experiment_file::{Compiled, ExperimentFile},
     json,
     place::Intent,
@@ -36,7 +36,9 @@ pub async fn simulate(
     args.trace.as_deref().map(|path| args.overwrite.check(path)).transpose()?;
     let Subject { compiled, genotype, generation } = subject(settings, args, progress).await?;
     // Refuses an unfit genotype before touching a file.
-    let refused = |error: EvaluateError| Error::Input(format!("{genotype}: {error}"));
+    let refused = |error: EvaluateError| {
+        Error::at(Code::BadGenotype, genotype.place(), format!("{genotype}: {error}"))
+    };
     compiled.experiment.network_json(&genotype.genes).map_err(refused)?;
     let mut trace = match &args.trace {
         Some(path) => Some(Trace::create(
@@ -98,10 +100,11 @@ async fn subject(
 ) -> Result<Subject, Error> {
     if let Some(address) = args.address() {
         if args.genotype.is_some() || args.experiment.is_some() {
-            return Err(Error::Input(format!(
+            let message = format!(
                 "no file `{address}` exists; if it is the address of a genotype, leave out \
                  --genotype and --experiment, which need an experiment file"
-            )));
+            );
+            return Err(Error::at(Code::UnreadableFile, address, message));
         }
         let connection = Connection::open(settings, Intent::Read, progress).await?;
         let address = connection.resolve(&address).await?;

@@ -7,7 +7,7 @@ use experiment_file::{ConfigError, Problem};
 use serde::Serialize;
 
 use crate::{
-    error::Error,
+    error::{Code, Error},
     experiment_file::{Compiled, ExperimentFile, Overrides},
     json,
     progress::Progress,
@@ -58,7 +58,9 @@ pub fn validate(args: &ValidateArgs, progress: &mut Progress) -> Result<(), Erro
             files.len()
         ))),
         (n, _) => {
-            Err(Error::Input(format!("experiment files with problems: {n} of {}", files.len())))
+            let bad = reports.iter().find(|report| !report.ok).map_or("", |report| &report.file);
+            let message = format!("experiment files with problems: {n} of {}", files.len());
+            Err(Error::at(Code::InvalidExperiment, bad, message))
         }
     }
 }

@@ -75,7 +75,7 @@ pub async fn verify(
     let bytes = export::read(&args.file)?;
     let name = args.file.display();
     let bundle = waiting::busy(&format!("reading {name}"), || Bundle::read(&bytes))
-        .map_err(|error| Error::Input(format!("{name}: {error}")))?;
+        .map_err(|error| Error::of_file(&args.file, error))?;
     progress.expiring(&settings);
     let resimulation = Resimulation::open(settings, &bundle.config_json, args.workers, args.isa)?;
     let flawed = |flaw: Flaw| Error::Flawed(format!("{name}: {flaw}"));

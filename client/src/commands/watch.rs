@@ -282,7 +282,7 @@ async fn final_state(
     let experiment = connection.experiment(experiment_id).await?;
     let champion = match connection.champion(experiment_id).await {
         Ok(champion) => Some(champion),
-        Err(Error::NotFound(_)) => None,
+        Err(Error::NotFound(_) | Error::WrongState(_)) => None,
         Err(error) => return Err(error),
     };
     Ok(Followed { experiment, champion, first_best })
@@ -344,7 +344,7 @@ pub async fn deserted(connection: &Connection, experiments: &[Experiment]) -> Er
         for experiment in experiments {
             match connection.experiment(experiment.id).await {
                 Ok(experiment) if has_ended(experiment.state()) => {}
-                Ok(experiment) => return Error::NotFound(text::deserted(&experiment, data_dir)),
+                Ok(experiment) => return Error::WrongState(text::deserted(&experiment, data_dir)),
                 Err(error) => return error,
             }
         }

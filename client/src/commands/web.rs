@@ -54,7 +54,8 @@ pub async fn web(
     }
     let reader =
         Reader::open_alone(&data_dir(settings)).map_err(|error| Error::from_store(&error))?;
-    let cannot = |error| Error::Input(format!("cannot listen on {listen}: {error}"));
+    let cannot =
+        |error| Error::Input(format!("--web-listen {listen}: cannot listen there: {error}"));
     let listener = TcpListener::bind(listen).await.map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
     let token = random_token();

@@ -109,7 +109,7 @@ pub use read::plain;
 pub use reality::*;
 pub use report::suggestion;
 pub use robot::*;
-pub use schema::json_schema;
+pub use schema::{Allowed, Alternative, KeyFacts, UnknownKey, explain_key, json_schema};
 use schemars::JsonSchema;
 pub use seed::Seed;
 pub use sensors::*;

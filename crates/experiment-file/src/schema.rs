@@ -4,14 +4,18 @@
 //! further forms of a file (omitted keys, other notations, keys of SpikeSwarmSim), with
 //! the functions defined here.
 
+mod key;
+
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::{Map, Value, json};
 
 use super::description::describe_algorithms;
 use super::{
     AlgorithmDescription, ExperimentConfig, NamedAreaParams, NeuronModel, Parameters as _, limits,
-    parameters,
+    parameters, suggestion,
 };
+
+pub use key::{Allowed, Alternative, KeyFacts, UnknownKey, explain_key};
 
 /// Describes the format that [`ExperimentConfig::from_json`] reads (JSON Schema, draft 2020-12).
 /// Only the reader checks relations that a schema cannot express (names that resolve, sizes that

@@ -28,7 +28,7 @@ class Submitting(Looking):
         at = self.program.of("fleet")
         found, step = await self.checked(file)
         if not found["ok"]:
-            raise Failure("bad_experiment_file", file, "\n".join(it["message"] for it in found["problems"]), step)
+            raise Failure("invalid_experiment", file, "\n".join(it["message"] for it in found["problems"]), step)
         options = [f"--priority={priority}"] + [f"--{name}={it}" for name, it in (("generations", generations), ("group", group)) if it is not None]
         options += [f"--seeds={','.join(map(str, seeds))}"] if seeds else []
         submitted = await self.program.document("submit", *at, *options, "--", file, where=file, seconds=60)

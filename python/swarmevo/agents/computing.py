@@ -67,7 +67,7 @@ class Computing(Looking):
         seconds = self.budgets.within(seconds, 30)
         found, step = await self.checked(file)
         if not found["ok"]:
-            raise Failure("bad_experiment_file", file, "\n".join(it["message"] for it in found["problems"]), step)
+            raise Failure("invalid_experiment", file, "\n".join(it["message"] for it in found["problems"]), step)
         each = found["population_size"] * found["trials"]
         n = generations or found["generations"]
         each *= len(seeds or [0])

@@ -16,7 +16,6 @@ from .failures import bad_argument
 from .parameters import Address, Budgets, Experiment, File, Seconds, Where
 from .places import Directory
 from .program import Place, Program
-from .schema import explained
 
 PART_LEN = 6000
 """Characters of a long section in one answer."""
@@ -58,8 +57,8 @@ class Looking:
         self, key: Annotated[str, Field(description="a place in an experiment file; NAME stands for a name of your choice: world.objects.NAME.num_instances")] = ""
     ) -> CallToolResult:
         """Explain one key of experiment files: meaning, values, range, default, and the keys below it. Without `key`: the top of the file."""
-        document = await self.program.document("schema", where="key")
-        return answer(explained(document, key), "schema(key) of a key below it", "draft(changes={key: value}) sets a value")
+        found = await self.program.document("schema", f"--key={key}", where="key")
+        return answer(found, "schema(key) of a key below it", "draft(changes={key: value}) sets a value")
 
     async def validate(self, file: File) -> CallToolResult:
         """Check an experiment file and its script, without running it: every mistake at once, with its line, and warnings."""

@@ -166,7 +166,7 @@ impl Ranking {
 
 fn read_evaluation(directory: &str) -> Result<(Evaluation, Robustness), Error> {
     let path = Path::new(directory).join(FILE);
-    let input = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
+    let input = |problem: String| Error::of_file(&path, problem);
     let text = read_text(&path, TABLE_BYTES).map_err(|error| input(error.to_string()))?;
     let mut evaluation: Evaluation = serde_json::from_str(&text)
         .map_err(|error| input(format!("{error}; expected a file of `swarmctl evaluate`")))?;

@@ -152,7 +152,7 @@ impl Samples {
     /// The samples; fails if there is none.
     pub fn finish(self) -> Result<Vec<Sample>, Error> {
         if self.samples.is_empty() {
-            return Err(Error::NotFound("no run has completed yet".into()));
+            return Err(Error::WrongState("no run has completed yet".into()));
         }
         Ok(self.samples)
     }

@@ -7,7 +7,7 @@ use sim_core::Simulation;
 use super::{EvaluateArgs, realities::Realities};
 use crate::{
     change::{Change, Json, apply_all, split},
-    error::Error,
+    error::{Code, Error},
     experiment_file::{ExperimentFile, Overrides},
     json,
 };
@@ -44,14 +44,26 @@ impl Condition {
     /// Checks that the genotype has the length and range that the experiment demands.
     pub fn check(&self, genotype: &[f64]) -> Result<(), Error> {
         let checked = self.experiment.check_genotype(genotype);
-        let misfit = |error| Error::Input(format!("the genotype does not fit: {error}"));
+        let misfit = |error| {
+            Error::at(
+                Code::BadGenotype,
+                "--genotype",
+                format!("the genotype does not fit: {error}"),
+            )
+        };
         checked.map_err(|error| self.locate(misfit(error)))
     }
 
     /// Adds the name of this condition to an error about it.
     pub fn locate(&self, error: Error) -> Error {
         match error {
-            Error::Input(problem) => Error::Input(format!("condition {}: {problem}", self.name)),
+            Error::Input(problem) => {
+                let message = format!("condition {}: {problem}", self.name);
+                Error::at(Code::BadArgument, &self.name, message)
+            }
+            Error::At { code, place, message } => {
+                Error::At { code, place, message: format!("condition {}: {message}", self.name) }
+            }
             error => error,
         }
     }
@@ -130,7 +142,9 @@ struct Nominal {
 
 impl Nominal {
     fn condition(&self, name: String, changes: Vec<Change>) -> Result<Condition, Error> {
-        let input = |problem: String| Error::Input(format!("condition {name}: {problem}"));
+        let input = |problem: String| {
+            Error::at(Code::BadArgument, &name, format!("condition {name}: {problem}"))
+        };
         let mut file = self.base.clone();
         apply_all(&changes, &mut file).map_err(|problems| input(problems.join("; ")))?;
         let config = read(&format!("condition {name}"), &file)?;

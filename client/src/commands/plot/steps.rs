@@ -28,9 +28,9 @@ struct Row {
 /// conditions means all.
 pub fn figure(dir: &Path, metric: Option<&str>, conditions: &[String]) -> Result<Figure, Error> {
     file_kind::expect(dir, &[Kind::EvaluationDirectory], "the directory of an evaluation")
-        .map_err(|what| Error::Input(format!("{}: {what}", dir.display())))?;
+        .map_err(|what| Error::of_file(dir, what))?;
     let path = dir.join("steps.csv");
-    let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
+    let problem = |problem: String| Error::of_file(&path, problem);
     let mut reader = csv::Reader::from_path(&path).map_err(|error| problem(plain(&error)))?;
     let rows: Vec<Row> = reader.deserialize().collect::<Result<_, _>>().map_err(|error| {
         problem(format!("{}; expected a file of `swarmctl evaluate`", plain(&error)))

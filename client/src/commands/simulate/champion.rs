@@ -8,7 +8,7 @@ use swarm_proto::v1::Experiment;
 
 use crate::{
     args::ChangedArg,
-    error::Error,
+    error::{Code, Error},
     experiment_file::{ExperimentFile, Overrides},
 };
 
@@ -64,12 +64,13 @@ impl Origin {
         }
         let seed = seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
         let digest: String = self.config_digest.chars().take(SHOWN).collect();
-        Err(Error::Input(format!(
+        let message = format!(
             "{genotype}: it evolved in `{}`{seed}, configuration {digest}, and {} is another \
              experiment; give the original file, or --changed-conditions to accept this one",
             self.name.escape_debug(),
             file.path().display()
-        )))
+        );
+        Err(Error::at(Code::OtherExperiment, genotype, message))
     }
 }
 

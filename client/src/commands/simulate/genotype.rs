@@ -10,7 +10,7 @@ use super::{SimulateArgs, champion::Origin};
 use crate::{
     args::ChangedArg,
     connection::Connection,
-    error::Error,
+    error::{Code, Error},
     experiment_file::{Compiled, ExperimentFile},
     file_kind::{self, Kind},
     genotypes::{Found, described},
@@ -19,6 +19,9 @@ use crate::{
     progress::Progress,
     settings::Settings,
 };
+
+/// Before the path of a file with a genotype.
+const IN_FILE: &str = "genotype in ";
 
 /// Genes and their source, which is also their display.
 #[derive(Debug)]
@@ -33,12 +36,13 @@ impl Genotype {
     /// another experiment, unless `--changed-conditions` is given.
     pub fn read(path: &Path, file: &ExperimentFile, changed: ChangedArg) -> Result<Self, Error> {
         let (genes, origin) = read(path).map_err(|problem| {
-            Error::Input(format!("no genotype in {}: {problem}", path.display()))
+            let path = path.display();
+            Error::at(Code::UnreadableFile, &path, format!("no genotype in {path}: {problem}"))
         })?;
         if let Some(origin) = origin {
             origin.check(&path.display().to_string(), file, changed)?;
         }
-        Ok(Self { genes, source: format!("genotype in {}", path.display()) })
+        Ok(Self { genes, source: format!("{IN_FILE}{}", path.display()) })
     }
 
     /// The genotype at an address.
@@ -67,6 +71,13 @@ impl Genotype {
             return Ok(Self::found(address, found));
         }
         Ok(Self { genes: random(compiled), source: "random genotype".into() })
+    }
+}
+
+impl Genotype {
+    /// The file, or else the source.
+    pub fn place(&self) -> &str {
+        self.source.strip_prefix(IN_FILE).unwrap_or(&self.source)
     }
 }
 

@@ -87,7 +87,7 @@ fn deserted(
 ) -> Result<(), Error> {
     let unfinished = experiments.iter().find(|experiment| !has_ended(experiment.state()));
     match unfinished.filter(|_| is_of_some) {
-        Some(unfinished) => Err(Error::NotFound(text::deserted(unfinished, data_dir))),
+        Some(unfinished) => Err(Error::WrongState(text::deserted(unfinished, data_dir))),
         None => {
             progress.remark(&text::no_fleet(data_dir, None));
             Ok(())
