@@ -51,7 +51,8 @@ impl Recording {
         self.step_fitness.push(step.fitness.unwrap_or(f64::NAN));
         self.lights.extend(step.lights.iter().flat_map(|light| [light.x, light.y]));
         let movables = step.movables.iter();
-        self.movables.extend(movables.flat_map(|body| [body.position.x, body.position.y, body.heading]));
+        self.movables
+            .extend(movables.flat_map(|body| [body.position.x, body.position.y, body.heading]));
     }
 
     /// Makes room for all steps.
