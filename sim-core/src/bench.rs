@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::ops::Range;
 
-use determinism::simd::{Simd, WithSimd};
+use determinism::simd::{Simd, WithSimd, bytemuck};
 
 use crate::lanes::Lanes;
 use crate::network::dynamics::NetworkState;
@@ -93,7 +93,7 @@ pub fn multiply_adds(isa: Isa, rounds: usize) -> usize {
             for chain in chains {
                 sum = simd.add_f32s(sum, chain);
             }
-            simd.reduce_sum_f32s(sum)
+            bytemuck::cast_slice::<_, f32>(&[sum]).iter().sum()
         }
     }
     const N_CHAINS: usize = 12;

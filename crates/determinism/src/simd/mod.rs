@@ -98,8 +98,6 @@ operations! {
     fn neg_f32s(a: Self::f32s) -> Self::f32s;
     /// The square root.
     fn sqrt_f32s(a: Self::f32s) -> Self::f32s;
-    /// The sum of all lanes.
-    fn reduce_sum_f32s(a: Self::f32s) -> f32;
     /// a = b
     fn equal_f32s(a: Self::f32s, b: Self::f32s) -> Self::m32s;
     /// a < b

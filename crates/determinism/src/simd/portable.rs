@@ -1,13 +1,10 @@
 //! Vectors of four f32 for processors without a fused multiply-add, with the 128-bit instructions
-//! that every x86 processor and every browser has.
+//! that every x86-64 processor has, or lane by lane.
 
 #[cfg(target_feature = "sse2")]
 #[path = "sse2.rs"]
 mod instructions;
-#[cfg(target_feature = "simd128")]
-#[path = "simd128.rs"]
-mod instructions;
-#[cfg(not(any(target_feature = "sse2", target_feature = "simd128")))]
+#[cfg(not(target_feature = "sse2"))]
 #[path = "plain.rs"]
 mod instructions;
 
@@ -69,11 +66,6 @@ impl Simd for Portable {
     #[inline(always)]
     fn sqrt_f32s(self, a: Self::f32s) -> Self::f32s {
         cast(vector::sqrt(cast(a)))
-    }
-    #[inline(always)]
-    fn reduce_sum_f32s(self, a: Self::f32s) -> f32 {
-        let [a, b, c, d] = cast::<_, [f32; 4]>(a);
-        (a + b) + (c + d)
     }
     #[inline(always)]
     fn equal_f32s(self, a: Self::f32s, b: Self::f32s) -> Self::m32s {
