@@ -14,7 +14,7 @@ use crate::{commands::schema::Explained, error::Answer};
 enum Form {
     /// One value.
     Document,
-    /// One object per line of standard error, after remarks for people.
+    /// The last line of standard error, after remarks for people.
     LastLine,
 }
 

@@ -83,11 +83,20 @@ mod tests {
     use super::*;
     use crate::{
         commands::{RemoteCommand, submit::Evolve},
+        error::Code,
         experiment_file::Overrides,
     };
 
     fn parse(line: &str) -> Result<Args, ErrorKind> {
         Args::try_parse_from(line.split(' ')).map_err(|error| error.kind())
+    }
+
+    #[test]
+    fn the_help_lists_every_exit_code() {
+        let listed = |code: u8| MORE.contains(&format!("\n  {code:<3}  "));
+        for code in Code::ALL {
+            assert!(listed(code.exit_code()), "{}", code.name());
+        }
     }
 
     #[test]

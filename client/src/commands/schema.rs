@@ -50,7 +50,7 @@ Examples:
   swarmctl schema > experiment.schema.json
   swarmctl schema --key algorithm
   swarmctl schema --key world.objects.NAME.sensors --output json
-  swarmctl schema --of list";
+  swarmctl schema --of error";
 
 /// One key of experiment files.
 #[derive(Debug, Serialize, JsonSchema)]

@@ -17,7 +17,7 @@ macro_rules! codes {
 
         impl Code {
             /// All codes, in the order of their exit codes.
-            const ALL: &[Self] = &[$(Self::$variant,)*];
+            pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
             /// Its name in JSON.
             pub fn name(self) -> &'static str {
