@@ -4,16 +4,18 @@
     results/bodies.py transfer             evaluates champions of points as points and with bodies
     results/bodies.py evolve SEED          evolves D with bodies that block light and radio, and evaluates
                                            the champion
+    results/bodies.py time                 prints the processor time of four generations of D in each condition
     results/bodies.py report [--update]    prints the tables of docs/bodies.md, or writes them into that page
 
 The robots get the size of an e-puck, and the room has the size of the thesis's torus. `transfer` covers all
 seeds that results/fetch has brought, and writes results/bodies.csv. `evolve` takes D, because robots of A, B
 and C stay in their places; it writes history and champion to results/bodies/D-SEED.csv and .json, and adds
-rows to results/bodies.csv. `transfer` and `evolve` need swarmctl in the PATH. Needs Python 3.9.
+rows to results/bodies.csv. All but `report` need swarmctl in the PATH. Needs Python 3.9.
 """
 
 import csv
 import json
+import resource
 import statistics
 import subprocess
 import sys
@@ -72,6 +74,22 @@ def evolve(seed):
     algorithms.evolve(changed(experiment, {**BODIES, **blocked, **budget}), seed, stem, workers=1)
     with TABLE.open("a", newline="") as file:
         judge(file, task, blocked, "bodies", champion)
+
+
+def measure():
+    """Prints the median of three runs per condition, in turns, as multiples of the time of points."""
+    task, blocked = D
+    experiment = json.loads((RESULTS.parent / "configs" / f"{task}.json").read_text())
+    seconds = {condition: [] for condition in CONDITIONS}
+    for _ in range(3):
+        for condition, changes in conditions(blocked):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+            with tempfile.TemporaryDirectory() as folder:
+                algorithms.evolve(changed(experiment, {**changes, "algorithm.generations": 4}), 0, f"{folder}/run", 1)
+            seconds[condition].append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
+    points = statistics.median(seconds["points"])
+    for condition, values in seconds.items():
+        print(f"{condition}: {statistics.median(values):.1f} s, {statistics.median(values) / points:.2f} times points")
 
 
 def judge(file, task, blocked, evolved_as, champion):
@@ -139,6 +157,8 @@ if __name__ == "__main__":
         transfer()
     elif command == "evolve" and len(sys.argv) == 2:
         evolve(int(sys.argv[1]))
+    elif command == "time":
+        measure()
     elif command == "report":
         print_or_update(PAGE, "the thesis with bodies", table())
         print_or_update(PAGE, "evolving with bodies", learning())
