@@ -416,6 +416,7 @@ pub fn prefix_lines(text: &str, name: &impl std::fmt::Display) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment_file::{ExperimentFile, Overrides};
 
     const ADDRESS: &str = "http://127.0.0.1:7700";
 
@@ -471,6 +472,22 @@ mod tests {
         let error = Error::Config { file, problems };
         assert_eq!(error.report(), "a.json: line 3: x\na.json: world: y");
         assert_eq!(error.exit_code(), 2);
+    }
+
+    #[test]
+    fn programs_can_tell_a_file_that_cannot_be_read_from_one_with_mistakes() {
+        let directory = tempfile::tempdir().unwrap();
+        let code = |name: &str| {
+            let path = directory.path().join(name);
+            let read =
+                ExperimentFile::read(&path).and_then(|file| file.check(&Overrides::default()));
+            Error::invalid(&path, &read.err().unwrap()).code()
+        };
+        assert_eq!(code("missing.json"), Code::UnreadableFile);
+        std::fs::write(directory.path().join("bundle.zip"), b"PK\x03\x04").unwrap();
+        assert_eq!(code("bundle.zip"), Code::UnreadableFile);
+        std::fs::write(directory.path().join("empty.json"), "{}").unwrap();
+        assert_eq!(code("empty.json"), Code::InvalidExperiment);
     }
 
     #[test]
