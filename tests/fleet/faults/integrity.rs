@@ -102,12 +102,12 @@ fn a_deleted_lock_file_does_not_let_a_second_coordinator_in() {
 #[test]
 fn a_coordinator_that_loses_its_database_to_another_stops_and_fails_nothing() {
     let mut coordinator = CoordinatorProcess::start();
-    let _workers = WorkerProcess::start_many(&coordinator, 2);
     let id = TINY.submit(&coordinator);
-    coordinator.wait_for_generation(1);
     // The first step of a coordinator on another machine, whose locks do not reach this one.
     let claim = "UPDATE identity SET owner = randomblob(16)";
     coordinator.database().execute(claim, []).unwrap();
+    // With workers from the beginning, the experiment could end before.
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
     assert_eq!(coordinator.process.wait().code(), Some(3));
     let lines = coordinator.process.lines();
     let last = lines.last().unwrap();
@@ -127,9 +127,7 @@ fn a_coordinator_that_loses_its_database_to_another_stops_and_fails_nothing() {
 #[test]
 fn a_coordinator_whose_database_breaks_stops_and_fails_nothing() {
     let mut coordinator = CoordinatorProcess::start();
-    let workers = WorkerProcess::start_many(&coordinator, 2);
     let id = TINY.submit(&coordinator);
-    coordinator.wait_for_generation(0);
     // Makes the table of events point to a page that does not exist.
     let database = coordinator.database();
     let root = "SELECT rootpage FROM sqlite_schema WHERE name = 'events'";
@@ -144,6 +142,8 @@ fn a_coordinator_whose_database_breaks_stops_and_fails_nothing() {
         database.execute_batch(&sql).unwrap();
     };
     move_to(&database, 1 << 30, version + 1);
+    // With workers from the beginning, the experiment could end before.
+    let workers = WorkerProcess::start_many(&coordinator, 2);
     assert_eq!(coordinator.process.wait().code(), Some(2));
     let lines = coordinator.process.lines();
     let last = lines.last().unwrap()["message"].as_str().unwrap();
