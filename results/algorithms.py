@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 
 RESULTS = Path(__file__).resolve().parent
-ALGORITHMS = ["GA", "SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES"]
+ALGORITHMS = ["GA", "SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES", "PGPE"]
 COLUMNS = ["generation", "best", "mean", "min", "episodes"]
 
 

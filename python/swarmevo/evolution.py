@@ -277,6 +277,12 @@ class OpenAIES(Evolution):
     algorithm = "openaiES"
 
 
+class PGPE(Evolution):
+    """Parameter-exploring policy gradients with ClipUp."""
+
+    algorithm = "PGPE"
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of an algorithm."""
@@ -300,6 +306,6 @@ def algorithms() -> dict[str, list[Parameter]]:
 
 
 __all__ = [
-    "CMAES", "Champion", "Evolution", "GA", "Generation", "OpenAIES", "Parameter", "SNES",
+    "CMAES", "Champion", "Evolution", "GA", "Generation", "OpenAIES", "PGPE", "Parameter", "SNES",
     "SepCMAES", "TrialSet", "XNES", "algorithms",
 ]

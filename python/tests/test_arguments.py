@@ -84,7 +84,8 @@ CASES = {
     "TrialSet.judgement.generation": swarmevo.TrialSet.judgement,
     **{
         f"{it.__name__}.{key}": lambda value, it=it, key=key: it(**{"n_genes": 3, key: value})
-        for it in (swarmevo.GA, swarmevo.SNES, swarmevo.XNES, swarmevo.CMAES, swarmevo.SepCMAES, swarmevo.OpenAIES)
+        for it in (swarmevo.GA, swarmevo.SNES, swarmevo.XNES, swarmevo.CMAES, swarmevo.SepCMAES, swarmevo.OpenAIES,
+                   swarmevo.PGPE)
         for key in ("n_genes", "population_size", "seed")
     },
     "Evolution.compare.trials": lambda it: evolved().compare(QUICK.fitness, it),
@@ -187,7 +188,7 @@ def test_no_number_is_forgotten():
     """The table contains every argument that is annotated as a whole number."""
     named = {f"{owner}.{key}".removeprefix("swarmevo.") for owner, key in numbers()}
     inherited = {f"{it.__name__}.{name}" for it in (swarmevo.GA, swarmevo.SNES, swarmevo.XNES, swarmevo.CMAES,
-                                                      swarmevo.SepCMAES, swarmevo.OpenAIES) for name in ("compare", "judge")}
+                                                      swarmevo.SepCMAES, swarmevo.OpenAIES, swarmevo.PGPE) for name in ("compare", "judge")}
     left = {it for it in named - CASES.keys() if it.rpartition(".")[0] not in inherited}
     # Leaves out results, which only the package makes; inherited members; and members that are
     # tested under another name.

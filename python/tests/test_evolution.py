@@ -10,7 +10,7 @@ import pytest
 import swarmevo
 
 ALL = [swarmevo.GA, swarmevo.SNES, swarmevo.XNES, swarmevo.CMAES, swarmevo.SepCMAES,
-       swarmevo.OpenAIES]
+       swarmevo.OpenAIES, swarmevo.PGPE]
 
 
 def sphere(genotypes):

@@ -123,7 +123,7 @@ def test_replacing_the_algorithm_leaves_no_parameters_behind(quickstart):
     config = quickstart.to_dict()
     config["algorithm"]["populations"]["network"]["params"] |= {"eta_mu": 0.5}
     tuned = swarmevo.Experiment.from_dict(config)
-    for it in (swarmevo.GA, swarmevo.XNES, swarmevo.CMAES, swarmevo.SepCMAES, swarmevo.OpenAIES, swarmevo.SNES):
+    for it in (swarmevo.GA, swarmevo.XNES, swarmevo.CMAES, swarmevo.SepCMAES, swarmevo.OpenAIES, swarmevo.PGPE, swarmevo.SNES):
         other = tuned.replace(algorithm=it, seed=3, generations=4, population_size=10, name="other")
         of = other.to_dict()["algorithm"]
         assert (of["name"], other.seed, other.generations, other.population_size, other.name) == (it.algorithm, 3, 4, 10, "other")

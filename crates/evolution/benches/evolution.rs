@@ -28,6 +28,11 @@ fn openai_es(bencher: Bencher) {
 }
 
 #[divan::bench]
+fn pgpe(bencher: Bencher) {
+    generation(bencher, "PGPE", Params::default());
+}
+
+#[divan::bench]
 fn sep_cma_es(bencher: Bencher) {
     generation(bencher, "sep-CMA-ES", Params::default());
 }

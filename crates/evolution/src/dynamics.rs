@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn samples_have_the_reported_deviations() {
-        for name in ["SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES"] {
+        for name in ["SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES", "PGPE"] {
             let setup = Setup { population_size: 4000, ..Setup::new(name, 2) };
             let evolution = setup.start().unwrap();
             let deviations = evolution.populations[0].deviations().unwrap();

@@ -9,7 +9,9 @@ mod cumulation;
 mod ga;
 mod linalg;
 mod openai_es;
+mod pairs;
 mod parameters;
+mod pgpe;
 mod sep_cma_es;
 mod snes;
 mod xnes;
@@ -80,6 +82,8 @@ registry! {
     sep_cma_es::SepCmaEs,
     /// OpenAI's evolution strategy.
     openai_es::OpenAiEs,
+    /// Policy gradients with ClipUp.
+    pgpe::Pgpe,
 }
 
 /// The draws of an algorithm for one generation.

@@ -9,7 +9,11 @@ use determinism::random::Stream;
 use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom, Parameter, Params};
 use serde::{Deserialize, Serialize};
 
-use super::{Described, Sample, Strategy, draw_normal, draw_normals, parameters::MU_INIT};
+use super::{
+    Described, Sample, Strategy,
+    pairs::{centred_ranks, draw_of_pairs, draw_pairs},
+    parameters::MU_INIT,
+};
 use crate::Genotype;
 
 /// A Gaussian whose mean mu, kept in \[0, 1\], learns, and whose standard
@@ -99,13 +103,7 @@ impl Strategy for OpenAiEs {
     /// individual of an odd population is mu itself: it has a rank and adds nothing to the
     /// gradient.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let d = self.mu.len();
-        let mut normals = Vec::with_capacity(population_size);
-        for e in draw_normals(population_size / 2, d, rng) {
-            let mirrored = e.iter().map(|e| -e).collect();
-            normals.extend([e, mirrored]);
-        }
-        normals.resize(population_size, vec![0.0; d]);
+        let normals = draw_pairs(population_size, self.mu.len(), rng);
         let genotypes = normals.iter().map(|e| self.genotype(e)).collect();
         Sample::new(genotypes, normals)
     }
@@ -115,13 +113,7 @@ impl Strategy for OpenAiEs {
     }
 
     fn individual(&self, index: usize, n: usize, rng: &mut Stream) -> Option<Genotype> {
-        let d = self.mu.len();
-        let is_mean = !n.is_multiple_of(2) && index + 1 == n;
-        let mut e = if is_mean { vec![0.0; d] } else { draw_normal(index / 2, d, rng) };
-        if !index.is_multiple_of(2) {
-            e.iter_mut().for_each(|e| *e = -*e);
-        }
-        Some(self.genotype(&e))
+        Some(self.genotype(&draw_of_pairs(index, n, self.mu.len(), rng)))
     }
 
     /// With the centred ranks c = 1/2 (best) to -1/2 (worst), evenly spaced:
@@ -130,12 +122,8 @@ impl Strategy for OpenAiEs {
     fn learn(&mut self, sample: &Sample, ranking: &[usize], _fitness: &[f64]) {
         let d = self.mu.len();
         let n = ranking.len();
-        let mut centred_rank = vec![0.0; n];
-        for (place, &individual) in ranking.iter().enumerate() {
-            centred_rank[individual] = 0.5 - place as f64 / (n - 1) as f64;
-        }
         let mut sum = vec![0.0; d];
-        for (rank, e) in centred_rank.iter().zip(&sample.normals) {
+        for (rank, e) in centred_ranks(ranking).iter().zip(&sample.normals) {
             for j in 0..d {
                 sum[j] += rank * e[j];
             }

@@ -33,6 +33,10 @@ fn defaults_are_written_out_in_a_fixed_order() {
             "openaiES",
             r#"{"mu_init":0.5,"sigma":0.1,"learning_rate":0.02,"beta1":0.9,"beta2":0.999,"weight_decay":0.0}"#,
         ),
+        (
+            "PGPE",
+            r#"{"mu_init":0.5,"sigma_init":0.2,"momentum":0.9,"eta_sigma":0.1,"sigma_max_change":0.2}"#,
+        ),
     ] {
         let canonical = canonical(algorithm);
         assert!(canonical.contains(&format!(r#""params":{expected}"#)), "{canonical}");

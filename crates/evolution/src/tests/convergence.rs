@@ -213,6 +213,28 @@ fn openai_es() {
     );
 }
 
+/// The steps of the mean do not shrink. So targets are modest.
+#[test]
+fn pgpe() {
+    assert_converges(
+        "PGPE",
+        &suite::params(&[("max_speed", 0.01)]),
+        &[
+            case((Sphere, 10), 20, 0.01, 11_000),
+            case((Ellipsoid, 10), 20, 100.0, 9_000),
+            case((Edge, 10), 20, 100.0, 12_000),
+            case((Rosenbrock, 10), 20, 8.0, 8_600),
+            case((Rastrigin, 10), 50, 30.0, 12_500),
+            case((Sphere, 50), 20, 1.0, 15_500),
+        ],
+    );
+    assert_converges(
+        "PGPE",
+        &suite::params(&[]),
+        &[case((Ellipsoid, 10), 20, 100.0, 9_000), case((Sphere, 10), 20, 0.1, 10_000)],
+    );
+}
+
 #[test]
 fn xnes_solves_a_function_in_8000_evaluations_with_fast_rates_only() {
     let missing = |rates: &str| {

@@ -4,6 +4,7 @@ mod adversity;
 mod canonical;
 mod convergence;
 mod fork;
+mod golden;
 mod honesty;
 mod lineage;
 mod reference;
@@ -286,6 +287,7 @@ fn the_name_in_the_configuration_chooses_the_algorithm() {
         ("CMA-ES", "CmaEs"),
         ("sep-CMA-ES", "SepCmaEs"),
         ("openaiES", "OpenAiEs"),
+        ("PGPE", "Pgpe"),
     ] {
         let evolution = Evolution::new(&config(name, 6, &["a", "b"]), &segments(&[2, 3]), "test");
         assert_eq!(evolution.ask().genotypes[0].len(), 5);

@@ -78,6 +78,11 @@ fn openai_es_follows_its_paper() {
     assert_follows(include_str!("../../tests/fixtures/openai_es.json"), 1e-13);
 }
 
+#[test]
+fn pgpe_follows_its_paper() {
+    assert_follows(include_str!("../../tests/fixtures/pgpe.json"), 1e-13);
+}
+
 /// The package `cma` adds 1e-9 to the length by which it divides negative weights.
 #[test]
 fn cma_es_follows_the_package_cma() {

@@ -7,7 +7,7 @@ use super::world::Robot;
 use super::{Dice, insert, object};
 
 pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Value {
-    let name = dice.pick(&["GA", "SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES"]);
+    let name = dice.pick(&["GA", "SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES", "PGPE"]);
     let mut tasks = vec!["grouping"];
     if network.has_led {
         tasks.extend(["identify_leader", "identify_borderline"]);
@@ -130,6 +130,18 @@ fn params(dice: &mut Dice, algorithm: &str) -> Value {
                 ("beta2", json!(0.25)),
                 ("weight_decay", decay),
                 ("encoding", json!("real")),
+            ],
+        ),
+        "PGPE" => object(
+            dice,
+            [
+                ("mu_init", mu_init),
+                ("sigma_init", sigma),
+                ("max_speed", eta_b),
+                ("step_size", eta_mu),
+                ("momentum", decay),
+                ("eta_sigma", eta_sigma),
+                ("sigma_max_change", json!(0.25)),
             ],
         ),
         _ => object(dice, [("mu_init", mu_init), ("sigma_init", sigma)]),
