@@ -1,9 +1,10 @@
 //! Changes of an experiment file: a path and a new value, as `--set` takes them.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
 use clap::Args;
 use indexmap::IndexMap;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -17,6 +18,20 @@ pub enum Json {
     Object(IndexMap<String, Json>),
     List(Vec<Json>),
     Scalar(Value),
+}
+
+impl JsonSchema for Json {
+    fn schema_name() -> Cow<'static, str> {
+        Value::schema_name()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        Value::json_schema(generator)
+    }
+
+    fn inline_schema() -> bool {
+        true
+    }
 }
 
 impl Json {

@@ -6,13 +6,13 @@ use std::{
 };
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 use swarm_proto::v1::Experiment;
 use tokio::sync::oneshot;
 
 use crate::{
     error::{Code, Error},
-    json,
     progress::Progress,
     text,
 };
@@ -26,6 +26,15 @@ pub struct Consent {
     /// Print the planned changes, and make none.
     #[arg(long, conflicts_with = "yes")]
     dry_run: bool,
+}
+
+/// The planned changes, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Planned<'a> {
+    /// The command.
+    would: &'a str,
+    /// Numbers of the experiments that it would change.
+    experiments: Vec<u64>,
 }
 
 /// The next action of the command.
@@ -54,16 +63,17 @@ impl Consent {
         match self.next(experiments.len(), has_people) {
             Next::Do => Ok(true),
             Next::List => {
+                if progress.is_json() {
+                    let experiments = experiments.iter().map(|experiment| experiment.id).collect();
+                    progress.print_document(&Planned { would: what, experiments })?;
+                    return Ok(false);
+                }
                 let lines = experiments
                     .iter()
                     .map(|experiment| format!("would {what} {}", text::state_line(experiment)));
                 let lines: Vec<String> =
                     lines.chain([format!("nothing was done to {n}")]).collect();
-                progress.print(&if progress.is_json() {
-                    json::document(&json!({ "would": what, "experiments": ids(experiments) }))
-                } else {
-                    lines.join("\n")
-                })?;
+                progress.print(&lines.join("\n"))?;
                 Ok(false)
             }
             Next::Refuse => Err(Error::at(
@@ -93,10 +103,6 @@ impl Consent {
             _ => Next::Refuse,
         }
     }
-}
-
-fn ids(experiments: &[Experiment]) -> Vec<u64> {
-    experiments.iter().map(|experiment| experiment.id).collect()
 }
 
 /// A line of standard input, read on a thread that an interrupt can abandon.

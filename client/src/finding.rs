@@ -3,6 +3,7 @@
 use std::{borrow::Cow, fmt, path::Path};
 
 use model::store::Holder;
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{
     Experiment, ExperimentState, ExplainExperimentResponse, Round, WithheldWorker,
@@ -19,7 +20,7 @@ const LONG_MS: u64 = 60_000;
 const STALL_MS: u64 = 10_000;
 
 /// One cause of an experiment's progress, or of the lack of it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
     kind: Kind,
     /// The finding, in one sentence.
@@ -29,7 +30,7 @@ pub struct Finding {
 }
 
 /// The kind of a finding, for programs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     Ended,

@@ -7,9 +7,11 @@ use std::collections::BTreeMap;
 
 use experiment_file::Seed;
 use model::wire::state_name;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Serialize;
 use swarm_proto::v1::{
-    Event, Experiment, ForkOrigin, GenerationSummary, GetChampionResponse, event::Kind,
+    Event, Experiment, ExperimentState, ForkOrigin, GenerationSummary, GetChampionResponse,
+    event::Kind,
 };
 
 use crate::{subject::Subject, text};
@@ -26,23 +28,51 @@ pub fn document(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain data with string keys serialises")
 }
 
+/// The states of experiments, by name.
+fn states(_: &mut SchemaGenerator) -> Schema {
+    let states = (0..).map_while(|number| ExperimentState::try_from(number).ok());
+    json_schema!({"type": "string", "enum": states.map(state_name).collect::<Vec<_>>()})
+}
+
 /// An event, as `watch --events` prints it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Event")]
 pub struct LogLine<'a> {
+    /// Time of the event, milliseconds since 1970 in UTC.
     at_ms: u64,
+    /// Number of the experiment.
     experiment: u64,
+    /// Name of the experiment.
     name: &'a str,
+    /// Number of the event among those of its experiment, from 1.
     sequence: u64,
+    /// Absent if this program does not know the kind of the event.
     #[serde(flatten)]
     kind: Option<LogKind<'a>>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum LogKind<'a> {
-    Generation(#[serde(serialize_with = "GenerationFields::serialize")] &'a GenerationSummary),
-    State { state: &'static str, reason: &'a str },
-    Notice { message: &'a str },
+    /// A generation is complete.
+    Generation(
+        #[serde(serialize_with = "GenerationFields::serialize")]
+        #[schemars(with = "GenerationFields")]
+        &'a GenerationSummary,
+    ),
+    /// The experiment has another state.
+    State {
+        /// The new state.
+        #[schemars(schema_with = "states")]
+        state: &'static str,
+        /// The reason; empty if there is none.
+        reason: &'a str,
+    },
+    /// A remark of the coordinator.
+    Notice {
+        /// The remark, for people.
+        message: &'a str,
+    },
 }
 
 impl<'a> LogLine<'a> {
@@ -60,30 +90,48 @@ impl<'a> LogLine<'a> {
 }
 
 /// A generation, as `run`, `watch`, `list` and `history` print it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Generation")]
 pub struct GenerationLine<'a> {
+    /// Number of the experiment.
     experiment: u64,
     #[serde(flatten, serialize_with = "GenerationFields::serialize")]
+    #[schemars(with = "GenerationFields")]
     summary: &'a GenerationSummary,
-    /// Only `history` prints it.
+    /// Time of the commit, milliseconds since 1970 in UTC. Only `history` prints it.
     #[serde(skip_serializing_if = "Option::is_none")]
     completed_at_ms: Option<u64>,
 }
 
 /// The fields of the message, in the order of the printed keys. It is no type of a value: Serde
 /// takes the order of keys from a declaration, and the message has another one.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 #[serde(remote = "GenerationSummary")]
+#[schemars(inline)]
 struct GenerationFields {
+    /// Number of the generation, from 0.
     generation: u64,
+    /// Fitness of the best individual, its mean over the trials; in these trials it was lucky.
+    #[schemars(with = "Option<f64>")]
     best: f64,
+    /// Mean fitness of the individuals.
+    #[schemars(with = "Option<f64>")]
     mean: f64,
+    /// Fitness of the worst individual.
+    #[schemars(with = "Option<f64>")]
     min: f64,
+    /// Standard deviation of the individuals' fitness.
+    #[schemars(with = "Option<f64>")]
     standard_deviation: f64,
+    /// Number of simulated episodes.
     episodes: u64,
+    /// Duration, milliseconds.
     duration_ms: u64,
+    /// Number of workers that computed it.
     workers: u32,
+    /// Share of the workers' time in which they had nothing to compute, from 0 to 1.
     idle_share: f64,
+    /// Digest of everything up to this generation, 64 hexadecimal digits.
     digest: String,
 }
 
@@ -98,27 +146,39 @@ impl<'a> GenerationLine<'a> {
 }
 
 /// How an experiment ended: the last line of `run` and `watch`.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "End")]
 pub struct EndLine<'a> {
+    /// Number of the experiment.
     experiment: u64,
+    /// The state in which it ended.
+    #[schemars(schema_with = "states")]
     state: &'static str,
+    /// The reason of the state, if there is one.
     #[serde(skip_serializing_if = "str::is_empty")]
     reason: &'a str,
+    /// Digest of the whole run, 64 hexadecimal digits; null before the first generation.
     digest: Option<&'a str>,
+    /// Null before the first generation.
     champion: Option<ChampionSummary>,
+    /// The file with the champion, which commands write that compute the experiment themselves.
     #[serde(skip_serializing_if = "Option::is_none")]
     champion_file: Option<&'a str>,
 }
 
-/// A champion without its genes. `judged`: fitness on trials that selected nothing.
-/// `selection`: on the trials that selected it among the candidates.
-/// `fitness_when_chosen`: on those of its generation, which made it a candidate.
-#[derive(Debug, Serialize)]
+/// A champion without its genes.
+#[derive(Debug, Serialize, JsonSchema)]
 struct ChampionSummary {
+    /// Fitness on trials that selected nothing, known once the run has ended.
     judged: Option<Judged>,
+    /// Fitness on the trials that selected it among the candidates, which is optimistic.
     selection: Option<Selection>,
+    /// Fitness on the trials of its generation, which made it a candidate; null for the mean of a
+    /// distribution.
     fitness_when_chosen: Option<f64>,
+    /// The generation in which it evolved, from 0.
     generation: u64,
+    /// Its index in the generation, from 0; null for the mean of a distribution.
     individual: Option<u32>,
 }
 
@@ -143,19 +203,28 @@ impl From<&GetChampionResponse> for ChampionSummary {
     }
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Judged {
+    /// Mean fitness of the trials.
+    #[schemars(with = "Option<f64>")]
     mean: f64,
-    /// Lower and upper end.
+    /// Lower and upper end of the 95 % interval of the mean.
+    #[schemars(with = "[Option<f64>; 2]")]
     ci95: [f64; 2],
+    /// Number of trials.
     trials: u32,
+    /// The generation after which it was judged, from 0.
     generation: u64,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Selection {
+    /// Mean fitness of the trials.
+    #[schemars(with = "Option<f64>")]
     mean: f64,
+    /// Number of trials.
     trials: u32,
+    /// The generation after which it was selected, from 0.
     generation: u64,
 }
 
@@ -177,43 +246,71 @@ impl<'a> EndLine<'a> {
 }
 
 /// An experiment, as `list`, `submit` and `cancel` print it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Experiment")]
 pub struct ExperimentDocument<'a> {
+    /// Number of the experiment.
     id: u64,
+    /// Its name, which other experiments may have, too.
     name: &'a str,
+    /// Its state.
+    #[schemars(schema_with = "states")]
     state: &'static str,
+    /// The reason of the state, if there is one.
     #[serde(skip_serializing_if = "str::is_empty")]
     reason: &'a str,
+    /// Number of complete generations.
     generations_done: u64,
+    /// Number of generations to do.
     generations: u64,
     seed: Seed,
+    /// Name of the algorithm, such as SNES.
     algorithm: &'a str,
+    /// Number of individuals of a generation.
     population_size: u32,
+    /// Number of genes of an individual.
     genotype_len: u32,
+    /// Share of the fleet relative to other experiments, from 1 to 1000.
     priority: u32,
+    /// Name of its group, if it has one.
     #[serde(skip_serializing_if = "str::is_empty")]
     group: &'a str,
+    /// The values, apart from the seed, in which it differs from others of its group.
     #[serde(skip_serializing_if = "str::is_empty")]
     variant: &'a str,
+    /// Labels, by key; absent without labels.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     labels: &'a BTreeMap<String, String>,
+    /// True if `list` leaves it out; else absent.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     archived: bool,
+    /// Time of the submission, milliseconds since 1970 in UTC.
     submitted_at_ms: u64,
+    /// Remaining time, milliseconds, if generations stay as fast as the latest ones; null if that
+    /// is unknown, or the experiment has ended.
     eta_ms: Option<u64>,
+    /// Mean fitness of the champion on trials that selected nothing; null before the end.
     champion_fitness: Option<f64>,
+    /// Mean fitness of the champion on the trials that selected it, which is optimistic; null
+    /// before these trials.
     champion_selection_fitness: Option<f64>,
+    /// Digest of the experiment file with its seed, 64 hexadecimal digits.
     config_digest: &'a str,
+    /// The origin of a fork; absent for others.
     #[serde(skip_serializing_if = "Option::is_none")]
     forked_from: Option<Origin<'a>>,
+    /// The latest complete generation; null before the first.
     latest: Option<GenerationLine<'a>>,
 }
 
 /// The origin of a fork.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Origin<'a> {
+    /// Number of the parent.
     experiment: u64,
+    /// The last generation that it shares with its parent, from 0.
     generation: u64,
+    /// The changes of the experiment file, each as KEY=VALUE.
     changes: &'a [String],
 }
 
@@ -256,165 +353,23 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
     }
 }
 
-/// The answer of a command about an experiment is the experiment; about a group, a list.
-pub fn experiments(subject: &Subject, experiments: &[Experiment]) -> String {
-    let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
-    match (subject, &documents[..]) {
-        (Subject::Experiment(_), [one]) => document(one),
-        _ => document(&documents),
+/// The answer of a command about an experiment is one value; about a group, a list.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum OneOrMore<T> {
+    One(T),
+    More(Vec<T>),
+}
+
+impl<T> OneOrMore<T> {
+    /// The answer about a subject.
+    pub fn about(subject: &Subject, mut values: Vec<T>) -> Self {
+        match (subject, values.len()) {
+            (Subject::Experiment(_), 1) => Self::One(values.remove(0)),
+            _ => Self::More(values),
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use serde_json::{Value, json};
-    use swarm_proto::v1::{ExperimentState, HeldOutFitness, JudgedFitness};
-
-    use super::*;
-
-    fn summary() -> GenerationSummary {
-        GenerationSummary {
-            generation: 11,
-            best: 0.1 + 0.2,
-            mean: f64::MIN_POSITIVE,
-            min: -0.0,
-            standard_deviation: 1.0 / 3.0,
-            digest: "1a2b".into(),
-            duration_ms: 250,
-            episodes: 500,
-            workers: 2,
-            idle_share: 0.05,
-        }
-    }
-
-    fn champion() -> GetChampionResponse {
-        GetChampionResponse {
-            experiment_id: 3,
-            generation: 7,
-            individual: Some(2),
-            fitness: Some(1.25),
-            held_out: None,
-            judged: None,
-            trial_fitness: vec![1.0, 1.5],
-            genotype: vec![0.1, 1.0 / 3.0],
-            network_json: r#"{"neurons":[{"tau":0.1}]}"#.into(),
-        }
-    }
-
-    #[test]
-    fn a_generation_is_one_line_whose_numbers_read_back_exactly() {
-        let summary = summary();
-        let text = line(&GenerationLine::new(3, &summary));
-        assert!(!text.contains('\n'));
-        let value: Value = serde_json::from_str(&text).unwrap();
-        assert_eq!(value["experiment"], 3);
-        assert_eq!(value["generation"], 11);
-        assert_eq!(value["digest"], "1a2b");
-        let bits = |key: &str| value[key].as_f64().unwrap().to_bits();
-        assert_eq!(bits("best"), summary.best.to_bits());
-        assert_eq!(bits("mean"), summary.mean.to_bits());
-        assert_eq!(bits("min"), summary.min.to_bits());
-        assert_eq!(bits("standard_deviation"), summary.standard_deviation.to_bits());
-    }
-
-    #[test]
-    fn a_seed_that_jq_would_round_is_text() {
-        let experiment = |seed| Experiment { seed, ..Experiment::default() };
-        let seed = |seed| {
-            let experiment = experiment(seed);
-            let listed = serde_json::to_value(ExperimentDocument::from(&experiment)).unwrap();
-            let champion = champion();
-            let champion = ChampionDocument::new(&experiment, &champion).unwrap();
-            assert_eq!(listed["seed"], serde_json::to_value(champion).unwrap()["seed"]);
-            listed["seed"].clone()
-        };
-        assert_eq!(seed(1 << 53), 1_u64 << 53);
-        assert_eq!(seed((1 << 53) + 1), "9007199254740993");
-    }
-
-    #[test]
-    fn a_fitness_that_is_no_number_is_null() {
-        let summary = GenerationSummary { min: f64::NAN, ..summary() };
-        let value: Value = serde_json::from_str(&line(&GenerationLine::new(3, &summary))).unwrap();
-        assert_eq!(value["min"], Value::Null);
-    }
-
-    #[test]
-    fn the_end_names_state_digest_and_champion() {
-        let experiment = Experiment {
-            id: 3,
-            state: ExperimentState::Completed.into(),
-            digest: "1a2b".into(),
-            ..Experiment::default()
-        };
-        let champion = champion();
-        let value = serde_json::to_value(EndLine::new(&experiment, Some(&champion))).unwrap();
-        assert_eq!(
-            value,
-            json!({
-                "experiment": 3,
-                "state": "completed",
-                "digest": "1a2b",
-                "champion": {
-                    "judged": null,
-                    "selection": null,
-                    "fitness_when_chosen": 1.25,
-                    "generation": 7,
-                    "individual": 2,
-                },
-            })
-        );
-    }
-
-    #[test]
-    fn judged_and_selection_fitness_stay_apart() {
-        let held_out = HeldOutFitness { mean: 1.5, ci95: 0.125, trials: 50, generation: 9 };
-        let judged =
-            JudgedFitness { mean: 1.0, low: 0.75, high: 1.125, trials: 200, generation: 9 };
-        let champion =
-            GetChampionResponse { held_out: Some(held_out), judged: Some(judged), ..champion() };
-        let value = serde_json::to_value(ChampionSummary::from(&champion)).unwrap();
-        let judged = json!({"mean": 1.0, "ci95": [0.75, 1.125], "trials": 200, "generation": 9});
-        assert_eq!(value["judged"], judged);
-        assert_eq!(value["selection"], json!({"mean": 1.5, "trials": 50, "generation": 9}));
-        assert_eq!(value["fitness_when_chosen"], 1.25);
-    }
-
-    #[test]
-    fn a_failure_before_the_first_generation_has_a_reason_and_no_champion() {
-        let experiment = Experiment {
-            id: 3,
-            state: ExperimentState::Failed.into(),
-            reason: "item 7 killed 3 workers".into(),
-            ..Experiment::default()
-        };
-        let value = serde_json::to_value(EndLine::new(&experiment, None)).unwrap();
-        let reason = "item 7 killed 3 workers";
-        assert_eq!(
-            value,
-            json!({"experiment": 3, "state": "failed", "reason": reason, "digest": null, "champion": null})
-        );
-    }
-
-    #[test]
-    fn a_champion_contains_its_network_and_its_experiment() {
-        let champion = champion();
-        let experiment = Experiment {
-            name: "leader".into(),
-            seed: 7,
-            config_digest: "c0".repeat(32),
-            simulation: "sim-core 1".into(),
-            ..Experiment::default()
-        };
-        let document = ChampionDocument::new(&experiment, &champion).unwrap();
-        let value = serde_json::to_value(document).unwrap();
-        assert_eq!(value["name"], "leader");
-        assert_eq!(value["seed"], 7);
-        assert_eq!(value["config_digest"], "c0".repeat(32));
-        assert_eq!(value["simulation"], "sim-core 1");
-        assert_eq!(value["network"]["neurons"][0]["tau"], 0.1);
-        assert_eq!(value["genotype"][1].as_f64().unwrap().to_bits(), (1.0f64 / 3.0).to_bits());
-        let broken = GetChampionResponse { network_json: "{".into(), ..champion };
-        assert!(ChampionDocument::new(&experiment, &broken).is_err());
-    }
-}
+mod tests;

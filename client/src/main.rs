@@ -3,7 +3,6 @@
 //! and checks files and simulates trials without a coordinator.
 
 mod address;
-mod answers;
 mod args;
 mod change;
 mod cli;

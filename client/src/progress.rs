@@ -1,6 +1,7 @@
 //! Output of a command: a progress bar on a terminal, lines elsewhere, or JSON lines.
 //! Results go to standard output, remarks to standard error.
 
+mod answers;
 mod beside_bar;
 
 use std::{
@@ -12,6 +13,7 @@ use std::{
 
 use console::measure_text_width;
 use indicatif::{FormattedDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{Experiment, GenerationSummary};
 use swarm_telemetry::{escape, escape_lines};
@@ -193,11 +195,11 @@ impl Progress {
         &mut self,
         table: &Table,
         csv_keys: &[&str],
-        records: &[impl Serialize],
+        records: &[impl Serialize + JsonSchema],
         empty: &str,
     ) -> Result<(), Error> {
         let text = match self.format {
-            OutputFormat::Json => return self.print(&json::document(&records)),
+            OutputFormat::Json => return self.print_document(&records),
             // For programs, to the byte.
             OutputFormat::Csv => table::csv(csv_keys, records),
             OutputFormat::Table | OutputFormat::Wide if records.is_empty() => {
@@ -355,7 +357,7 @@ impl Progress {
         }
         match self.format {
             OutputFormat::Json => {
-                self.print(&json::line(&json::GenerationLine::new(experiment_id, summary)))
+                self.print_line(&json::GenerationLine::new(experiment_id, summary))
             }
             _ if self.has_terminal => {
                 let done = self.followed.values().map(|followed| followed.done).sum();

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Not;
 
 use indexmap::IndexMap;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::communication::Mode;
@@ -18,13 +19,14 @@ pub type MeasureName = Cow<'static, str>;
 pub type Measures = IndexMap<MeasureName, f64>;
 
 /// The result of a watched episode.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct EpisodeSummary {
-    /// The fitness of the episode, as [`Simulation::evaluate`](crate::Simulation::evaluate)
-    /// returns it.
+    /// The fitness of the episode.
+    #[schemars(with = "Option<f64>")]
     pub fitness: f64,
-    /// Means of the measures over the steps that have them.
+    /// Means of the measures over the steps that have them, by name.
     #[serde(rename = "metrics")]
+    #[schemars(with = "IndexMap<MeasureName, Option<f64>>")]
     pub measures: Measures,
 }
 

@@ -35,9 +35,9 @@ fn refused(outcome: &Outcome, code: i32, what: &str) {
 #[test]
 fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
     let here = CoordinatorProcess::start();
-    let _workers = WorkerProcess::start_many(&here, 2);
     let id = here.submit(&ga().path());
     refused(&here.swarmctl(&["export", "1", "--to", "x.zip"]), 3, "experiment 1 has not ended");
+    let _workers = WorkerProcess::start_many(&here, 2);
     here.watch(id).finish();
     let forked = ["fork", "1@1", "--seed", "99", "--generations", "3"];
     here.swarmctl(&forked).expect_success();

@@ -119,9 +119,8 @@ impl CoordinatorProcess {
 
     /// Follows an experiment.
     pub fn watch(&self, id: u64) -> Watch {
-        let mut command = Command::new(binary("swarmctl"));
-        command.args(["--output", "json", "--coordinator", &self.url(), "watch", &id.to_string()]);
-        Watch { process: LoggingProcess::spawn(command, Source::Stdout) }
+        let args = ["--coordinator", &self.url(), "watch", &id.to_string()];
+        Watch { process: LoggingProcess::of_swarmctl(&args) }
     }
 
     /// Waits until the experiment's generation has been committed.

@@ -3,6 +3,7 @@
 //! Nothing here sleeps: tests wait for lines of the processes' logs, with a
 //! deadline that only a broken program meets.
 
+mod answers;
 mod binaries;
 mod experiment;
 mod fleet;

@@ -10,9 +10,9 @@ use std::{
     time::Duration,
 };
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use crate::binary;
+use crate::{answers::Answers, binary};
 
 /// A deadline that only a hanging program misses.
 pub(crate) const DEADLINE: Duration = Duration::from_secs(120);
@@ -28,6 +28,8 @@ pub type LogLine = Value;
 pub struct LoggingProcess {
     child: Child,
     lines: Arc<Lines>,
+    /// What the lines are, if they are answers of `swarmctl`.
+    answers: Option<Answers>,
 }
 
 #[derive(Debug, Default)]
@@ -68,7 +70,17 @@ impl LoggingProcess {
             sink.read.lock().expect(POISONED).1 = true;
             sink.changed.notify_all();
         });
-        Self { child, lines }
+        Self { child, lines, answers: None }
+    }
+
+    /// Starts `swarmctl --output json ARGS`.
+    pub(crate) fn of_swarmctl<A: AsRef<OsStr>>(args: &[A]) -> Self {
+        let answers = Answers::of_line(args);
+        let mut command = Command::new(binary("swarmctl"));
+        command.args(["--output", "json"]).args(args);
+        let mut process = Self::spawn(command, Source::Stdout);
+        process.answers = answers;
+        process
     }
 
     /// Waits for a line, past or future; panics if the process ends without it.
@@ -166,6 +178,11 @@ impl Drop for LoggingProcess {
         // A failed test must not leave processes behind.
         let _ = self.child.kill();
         let _ = self.child.wait();
+        if let (Some(answers), false) = (&self.answers, thread::panicking()) {
+            // A document has several lines, none of which is an object.
+            let objects = self.lines().into_iter().filter(LogLine::is_object);
+            objects.for_each(|line| answers.check(&line));
+        }
     }
 }
 
@@ -203,6 +220,7 @@ impl Outcome {
         let Ok(mut answer) = serde_json::from_str::<Value>(last) else { return self };
         let error = answer.get_mut("error").map(Value::take).unwrap_or_default();
         let Some(message) = error["message"].as_str() else { return self };
+        Answers::of_errors().check(&json!({ "error": error }));
         let is_of_lines = error["mistakes"].is_array() || message.contains(": cannot be read: ");
         let prefix = if is_of_lines { "" } else { "error: " };
         let lines: Vec<String> = remarks.iter().map(|line| format!("{line}\n")).collect();
@@ -231,14 +249,16 @@ impl Outcome {
 
 /// Runs `swarmctl --output json ARGS` to its end.
 pub fn swarmctl<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>) -> Outcome {
+    let args: Vec<A> = args.into_iter().collect();
+    let answers = Answers::of_line(&args);
     let mut command = Command::new(binary("swarmctl"));
     command.args(["--output", "json"]).args(args);
-    Outcome::of_command(&mut command)
+    let outcome = Outcome::of_command(&mut command);
+    answers.iter().for_each(|answers| answers.check_text(&outcome.stdout));
+    outcome
 }
 
 /// Starts `swarmctl --output json ARGS`.
 pub fn swarmctl_process<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>) -> LoggingProcess {
-    let mut command = Command::new(binary("swarmctl"));
-    command.args(["--output", "json"]).args(args);
-    LoggingProcess::spawn(command, Source::Stdout)
+    LoggingProcess::of_swarmctl(&args.into_iter().collect::<Vec<A>>())
 }

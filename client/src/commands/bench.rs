@@ -10,6 +10,7 @@ use std::{
 use clap::Args;
 use determinism::random::{Purpose, Stream};
 use experiment_file::ExperimentConfig;
+use schemars::JsonSchema;
 use serde::Serialize;
 use sim_core::{Isa, Simulation};
 
@@ -18,7 +19,6 @@ use crate::{
     clock,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
-    json,
     progress::Progress,
     text, waiting,
 };
@@ -77,7 +77,10 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
         })
     });
     let report = Report::new(&config, isa, n_cores, &speed);
-    progress.print(&if progress.is_json() { json::document(&report) } else { report.to_text() })
+    match progress.is_json() {
+        true => progress.print_document(&report),
+        false => progress.print(&report.to_text()),
+    }
 }
 
 fn experiment(path: Option<&Path>) -> Result<(ExperimentConfig, Simulation), Error> {
@@ -124,17 +127,26 @@ impl Speed {
 }
 
 /// The measured speed, and the estimated time of the experiment.
-#[derive(Debug, Serialize)]
-struct Report<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Speed")]
+pub struct Report<'a> {
+    /// Name of the experiment.
     experiment: &'a str,
+    /// The vector instructions.
     isa: &'static str,
+    /// Number of cores that simulated.
     cores: usize,
+    /// Steps of all robots that a core simulates per second.
     robot_steps_per_second_per_core: f64,
+    /// Time of a core for a step of a robot, microseconds.
     us_per_robot_step: f64,
+    /// Episodes that a core simulates per second.
     episodes_per_second_per_core: f64,
     /// Robot-steps of the whole experiment, without re-evaluations of champions.
     robot_steps: f64,
+    /// Time of one core for the whole experiment, minutes.
     core_minutes: f64,
+    /// Time of these cores for the whole experiment, minutes.
     minutes: f64,
 }
 

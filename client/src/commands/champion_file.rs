@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
 use super::individual::champion_document;
-use crate::{error::Error, output_file::Overwrite};
+use crate::{error::Error, json, output_file::Overwrite};
 
 /// Longest part of an experiment's name in a file's name, in characters.
 const FILE_NAME_CHARS_MAX: usize = 50;
@@ -19,7 +19,7 @@ pub fn write(
     champion: &GetChampionResponse,
 ) -> Result<PathBuf, Error> {
     let path = data_dir.join(champion_file_name(experiment));
-    let document = champion_document(experiment, champion)? + "\n";
+    let document = json::document(&champion_document(experiment, champion)?) + "\n";
     Overwrite::OWN.write(&path, document.as_bytes())?;
     Ok(path)
 }
@@ -68,6 +68,7 @@ mod tests {
         let experiment = experiment(3, "a");
         let path = write(dir.path(), &experiment, &champion).unwrap();
         let stored = fs::read_to_string(path).unwrap();
-        assert_eq!(stored, champion_document(&experiment, &champion).unwrap() + "\n");
+        let printed = json::document(&champion_document(&experiment, &champion).unwrap());
+        assert_eq!(stored, printed + "\n");
     }
 }

@@ -1,7 +1,7 @@
 //! `swarmctl compare`: compares samples of runs.
 
-mod realities;
-mod report;
+pub mod realities;
+pub mod report;
 mod samples;
 
 use std::path::PathBuf;
@@ -15,7 +15,6 @@ use crate::{
     connection::Connection,
     error::Error,
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
-    json,
     output_file::Overwrite,
     place::Intent,
     progress::Progress,
@@ -113,7 +112,7 @@ pub async fn compare(
         figure(&samples)?.write(to, args.overwrite)?;
     }
     match progress.is_json() {
-        true => progress.print(&json::document(&report)),
+        true => progress.print_document(&report),
         false => progress.print_parts(&report.to_parts()),
     }
 }
@@ -130,7 +129,7 @@ fn rank(args: &CompareArgs, progress: &mut Progress) -> Result<(), Error> {
     }
     let ranking = Ranking::read(&args.runs)?;
     match progress.is_json() {
-        true => progress.print(&json::document(&ranking)),
+        true => progress.print_document(&ranking),
         false => progress.print_parts(&ranking.to_parts()),
     }
 }

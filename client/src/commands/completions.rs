@@ -2,6 +2,8 @@
 
 use clap::{Args as ClapArgs, CommandFactory as _};
 use clap_complete::Shell;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::{cli::Args, error::Error, progress::Progress};
 
@@ -23,9 +25,20 @@ Examples:
   swarmctl completions zsh > ~/.zfunc/_swarmctl   # a directory in $fpath
   swarmctl completions fish > ~/.config/fish/completions/swarmctl.fish";
 
+/// Completions, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Completions<'a> {
+    /// The shell's script.
+    script: &'a str,
+}
+
 /// Prints the shell's script.
 pub fn completions(shell: Shell, progress: &mut Progress) -> Result<(), Error> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Args::command(), "swarmctl", &mut script);
-    progress.print(String::from_utf8_lossy(&script).trim_end())
+    let script = String::from_utf8_lossy(&script);
+    match progress.is_json() {
+        true => progress.print_document(&Completions { script: script.trim_end() }),
+        false => progress.print(script.trim_end()),
+    }
 }

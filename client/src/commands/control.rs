@@ -15,7 +15,7 @@ use crate::{
     connection::{Connection, present},
     error::Error,
     group::{Outcome, change_each, members},
-    json,
+    json::{ExperimentDocument, OneOrMore},
     place::Intent,
     progress::Progress,
     remote::{Remote, family},
@@ -245,12 +245,13 @@ pub fn print_of<T>(
     if outcome.changed.is_empty() {
         return outcome.end();
     }
-    progress.print(&if progress.is_json() {
-        let changed: Vec<Experiment> =
-            outcome.changed.iter().map(|change| experiment(change).clone()).collect();
-        json::experiments(&target.subject, &changed)
+    if progress.is_json() {
+        let changed = outcome.changed.iter().map(|change| experiment(change).into()).collect();
+        let changed: OneOrMore<ExperimentDocument<'_>> = OneOrMore::about(&target.subject, changed);
+        progress.print_document(&changed)?;
     } else {
-        outcome.changed.iter().map(line).collect::<Vec<_>>().join("\n")
-    })?;
+        let lines: Vec<String> = outcome.changed.iter().map(line).collect();
+        progress.print(&lines.join("\n"))?;
+    }
     outcome.end()
 }

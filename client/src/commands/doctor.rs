@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use model::store::{self, Fate, Finding, Inspection, Recovered, Recovery};
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_telemetry::escape;
 
 use super::backup::refused;
-use crate::{error::Error, json, output_file::Overwrite, progress::Progress, text, waiting};
+use crate::{error::Error, output_file::Overwrite, progress::Progress, text, waiting};
 
 /// Check the database of a data directory, or recover the sound part of a damaged one.
 ///
@@ -37,34 +38,67 @@ Examples:
   coordinator --data-dir ./recovered";
 
 /// The printed report on a database.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Inspection")]
 pub struct InspectionDocument<'a> {
+    /// Path of the database.
     database: &'a Path,
+    /// Version of the tables.
     schema_version: i64,
+    /// Number of experiments.
     experiments: usize,
+    /// Number of generations of all experiments.
     generations: usize,
+    /// The damage; empty if everything is sound.
     findings: Vec<FindingDocument<'a>>,
 }
 
-#[derive(Debug, Serialize)]
+/// Damage of a database.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Finding")]
 struct FindingDocument<'a> {
+    /// Number of the damaged experiment; null if the whole database is concerned.
     experiment: Option<u64>,
+    /// The damage.
     what: &'a str,
+    /// What to do.
     next_step: &'a str,
 }
 
-#[derive(Debug, Serialize)]
-struct RecoveryDocument<'a> {
+/// What was recovered.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Recovery")]
+pub struct RecoveryDocument<'a> {
+    /// The new data directory.
     data_dir: &'a Path,
+    /// Damage of the database as a whole.
     damage: &'a [String],
+    /// What has become of each experiment.
     experiments: Vec<RecoveredDocument<'a>>,
 }
 
-#[derive(Debug, Serialize)]
+/// An experiment of the damaged database.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Recovered")]
 struct RecoveredDocument<'a> {
+    /// Number of the experiment.
     id: u64,
-    outcome: &'static str,
+    /// What has become of it.
+    outcome: Outcome,
+    /// What is missing, or why.
     problems: &'a [String],
+}
+
+/// What has become of an experiment.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Outcome {
+    /// It is copied, except for its problems.
+    Kept,
+    /// Only its configuration is copied: it is paused before its first generation.
+    Restarted,
+    /// Nothing is copied.
+    Lost,
 }
 
 /// Checks a data directory, or recovers it into a new one.
@@ -74,11 +108,10 @@ pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Re
         let recovery = args.overwrite.data_directory(data_dir, to, |to| {
             waiting::busy(&what, || store::recover(data_dir, to)).map_err(|error| refused(&error))
         })?;
-        return progress.print(&if progress.is_json() {
-            json::document(&recovery_document(&recovery, to))
-        } else {
-            recovery_text(&recovery, to)
-        });
+        return match progress.is_json() {
+            true => progress.print_document(&recovery_document(&recovery, to)),
+            false => progress.print(&recovery_text(&recovery, to)),
+        };
     }
     let what = format!("checking everything in {}", data_dir.display());
     let inspection = waiting::busy(&what, || store::inspect(data_dir))
@@ -96,13 +129,12 @@ pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Re
 
 /// Prints the state of a database.
 pub fn print_inspection(inspection: &Inspection, progress: &mut Progress) -> Result<(), Error> {
-    progress.print(&if progress.is_json() {
-        json::document(&inspection_document(inspection))
-    } else {
-        let findings = inspection.findings.iter().map(finding_text);
-        let lines: Vec<String> = [summary(inspection)].into_iter().chain(findings).collect();
-        lines.join("\n")
-    })
+    if progress.is_json() {
+        return progress.print_document(&inspection_document(inspection));
+    }
+    let findings = inspection.findings.iter().map(finding_text);
+    let lines: Vec<String> = [summary(inspection)].into_iter().chain(findings).collect();
+    progress.print(&lines.join("\n"))
 }
 
 fn summary(inspection: &Inspection) -> String {
@@ -160,9 +192,9 @@ fn recovery_document<'a>(recovery: &'a Recovery, to: &'a Path) -> RecoveryDocume
     let recovered = |recovered: &'a Recovered| RecoveredDocument {
         id: recovered.id.0,
         outcome: match recovered.fate {
-            Fate::Kept => "kept",
-            Fate::Restarted => "restarted",
-            Fate::Lost => "lost",
+            Fate::Kept => Outcome::Kept,
+            Fate::Restarted => Outcome::Restarted,
+            Fate::Lost => Outcome::Lost,
         },
         problems: &recovered.problems,
     };

@@ -6,7 +6,7 @@ mod files;
 mod measured;
 mod realities;
 mod statistics;
-mod summary;
+pub mod summary;
 
 use std::pin::pin;
 
@@ -94,7 +94,7 @@ async fn evaluate_all(
     results.write("summary.json", &(json::document(&summary) + "\n"))?;
     results.finish()?;
     if progress.is_json() {
-        return progress.print(&json::document(&summary));
+        return progress.print_document(&summary);
     }
     let where_it_is = format!(
         "{} trials each; steps.csv, trials.csv and summary.json in {}",

@@ -1,6 +1,7 @@
 //! `swarmctl examples`: the experiments that are part of the program.
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
@@ -25,11 +26,15 @@ Examples:
   swarmctl run --example quickstart
   swarmctl new my_swarm --task flocking";
 
-/// A line of the list.
-#[derive(Debug, Serialize)]
-struct Listed {
+/// An example.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Example")]
+pub struct Listed {
+    /// Its name, for `--example` and `--task`.
     name: &'static str,
+    /// Number of generations.
     generations: u64,
+    /// What the robots do.
     about: &'static str,
 }
 

@@ -1,10 +1,11 @@
 //! `swarmctl explain`: what an experiment waits for, and the next steps.
 
-mod fleet;
+pub mod fleet;
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use model::wire::has_ended;
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{
     Event, ExplainExperimentRequest, ExplainExperimentResponse, HeldItems, Round, event::Kind,
@@ -22,9 +23,11 @@ use crate::{
     text,
 };
 
-#[derive(Debug, Serialize)]
-struct Explanation<'a> {
+/// What an experiment waits for.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Explanation<'a> {
     experiment: json::ExperimentDocument<'a>,
+    /// The most important first.
     findings: &'a [Finding],
 }
 
@@ -55,10 +58,7 @@ impl Remote for ExplainArgs {
                     Some(Explanation { experiment: answer.experiment.as_ref()?.into(), findings })
                 })
                 .collect();
-            return progress.print(&match (subject, &documents[..]) {
-                (Subject::Experiment(_), [one]) => json::document(one),
-                _ => json::document(&documents),
-            });
+            return progress.print_document(&json::OneOrMore::about(subject, documents));
         }
         let mut texts = Vec::new();
         for (answer, findings) in &explained {

@@ -8,6 +8,7 @@ use std::{
 
 use bundle::LEN_MAX;
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
@@ -16,7 +17,6 @@ use crate::{
     connection::{Connection, present},
     error::Error,
     file_kind::{self, Kind},
-    json,
     output_file::{Overwrite, unwritable},
     progress::Progress,
     remote::Remote,
@@ -54,12 +54,17 @@ Examples:
   swarmctl export 1 --to quickstart.zip --data-dir swarm-data
   swarmctl export 3 --tensorboard runs && tensorboard --logdir runs";
 
-/// A written bundle.
-#[derive(Debug, Serialize)]
-struct Written {
+/// A written bundle, or a file for TensorBoard.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Exported")]
+pub struct Written {
+    /// Number of the experiment.
     experiment: u64,
+    /// Path of the file.
     file: String,
+    /// Size of the file, bytes.
     bytes: usize,
+    /// SHA-256 of the file, 64 hexadecimal digits.
     sha256: String,
 }
 
@@ -94,12 +99,13 @@ async fn export(
     args.overwrite.write(&path, &bytes)?;
     let file = path.display().to_string();
     let written = Written { experiment: id, file, bytes: bytes.len(), sha256: sha256(&bytes) };
-    progress.print(&if progress.is_json() {
-        json::document(&written)
-    } else {
-        let Written { experiment, file, bytes, sha256 } = written;
-        format!("experiment {experiment} is in {file}, {bytes} bytes, SHA-256 {sha256}\n{next}")
-    })
+    if progress.is_json() {
+        return progress.print_document(&written);
+    }
+    let Written { experiment, file, bytes, sha256 } = written;
+    progress.print(&format!(
+        "experiment {experiment} is in {file}, {bytes} bytes, SHA-256 {sha256}\n{next}"
+    ))
 }
 
 /// The history of an experiment as an event file, and its path: TensorBoard shows each

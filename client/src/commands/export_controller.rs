@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use controller_c::{About, Controller, Episodes, LEN_MAX};
 use evolution::Digest;
 use experiment_file::limits;
+use schemars::JsonSchema;
 use serde::Serialize;
 use sim_core::{FINGERPRINT, TrialSet};
 
@@ -14,7 +15,6 @@ use crate::{
     args::whole,
     error::{Code, Error},
     experiment_file::{Compiled, Overrides},
-    json,
     output_file::Overwrite,
     progress::Progress,
     settings::Settings,
@@ -82,13 +82,20 @@ Examples:
   make -C robot clean test CC=aarch64-linux-gnu-gcc RUN=qemu-aarch64-static CFLAGS=-static";
 
 /// A written controller.
-#[derive(Debug, Serialize)]
-struct Written<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Controller")]
+pub struct Written<'a> {
+    /// Name of the experiment.
     experiment: &'a str,
+    /// The source of the genotype, for people.
     genotype: String,
+    /// Digest of the experiment file with its seed, 64 hexadecimal digits.
     config_digest: &'a str,
+    /// The directory with the files.
     directory: String,
+    /// Names of the files.
     files: Vec<&'static str>,
+    /// Number of recorded steps, counted for each robot; 0 in ONNX.
     robot_steps: u64,
 }
 
@@ -141,18 +148,17 @@ pub async fn export_controller(
     }
     output.finish()?;
     let directory = args.to.display().to_string();
-    progress.print(&if progress.is_json() {
-        let genotype = genotype.to_string();
-        let files = files.iter().map(|(name, _)| *name).collect();
-        json::document(&Written {
+    if progress.is_json() {
+        return progress.print_document(&Written {
             experiment: &about.experiment,
-            genotype,
+            genotype: genotype.to_string(),
             config_digest: &about.config_digest,
             directory,
-            files,
+            files: files.iter().map(|(name, _)| *name).collect(),
             robot_steps,
-        })
-    } else if args.language == Language::Onnx {
+        });
+    }
+    progress.print(&if args.language == Language::Onnx {
         format!("{genotype}: {} in {directory}", controller_onnx::NAME)
     } else {
         format!(

@@ -9,6 +9,7 @@ use std::{
 };
 
 use clap::{Args, Subcommand, ValueHint};
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::ExplainExperimentRequest;
 use swarm_telemetry::parse_positive_duration;
@@ -22,7 +23,6 @@ use crate::{
     args::whole,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING},
     error::Error,
-    json,
     progress::Progress,
     remote::{Remote, family},
     text,
@@ -125,14 +125,20 @@ impl Remote for FleetArgs {
     }
 }
 
-/// A check of the queues that led to an action, as JSON.
-#[derive(Debug, Serialize)]
-struct Look<'a> {
+/// A check of the queues that led to an action, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Look<'a> {
+    /// Number of open items of running experiments.
     items: u64,
+    /// Number of jobs before the action.
     jobs: usize,
+    /// Number of jobs that the items need.
     wanted: u32,
+    /// Numbers of the jobs that the command submitted.
     submitted: &'a [String],
+    /// Numbers of the waiting jobs that the command withdrew.
     withdrawn: &'a [String],
+    /// Numbers of the jobs whose workers end after their items.
     finishing: &'a [String],
 }
 
@@ -169,7 +175,10 @@ async fn scale(
                 withdrawn: &plan.withdraw,
                 finishing: &plan.finish,
             };
-            progress.print(&if progress.is_json() { json::line(&look) } else { look.line() })?;
+            match progress.is_json() {
+                true => progress.print_line(&look)?,
+                false => progress.print(&look.line())?,
+            }
         }
         sleep(interval).await;
     }

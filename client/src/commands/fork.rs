@@ -94,7 +94,7 @@ impl Remote for ForkArgs {
             }
             progress.print(&lines.join("\n"))?;
         } else if !is_followed {
-            progress.print(&json::document(&json::ExperimentDocument::from(&experiment)))?;
+            progress.print_document(&json::ExperimentDocument::from(&experiment))?;
         }
         if is_followed {
             watch::watch(connection, vec![experiment], progress).await

@@ -1,6 +1,6 @@
 //! `swarmctl history`: every generation of an experiment.
 
-mod dynamics;
+pub mod dynamics;
 
 use clap::Args;
 use swarm_proto::v1::GenerationSummary;

@@ -39,14 +39,13 @@ impl Remote for ImportArgs {
             error => error,
         });
         let (experiment, is_new) = imported?;
-        progress.print(&if progress.is_json() {
-            json::document(&json::ExperimentDocument::from(&experiment))
-        } else {
-            let title = text::title(&experiment);
-            match is_new {
-                true => format!("{title}: imported"),
-                false => format!("{title}: it is there already"),
-            }
+        if progress.is_json() {
+            return progress.print_document(&json::ExperimentDocument::from(&experiment));
+        }
+        let title = text::title(&experiment);
+        progress.print(&match is_new {
+            true => format!("{title}: imported"),
+            false => format!("{title}: it is there already"),
         })
     }
 }

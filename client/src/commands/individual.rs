@@ -10,7 +10,7 @@ use crate::{
     complete,
     connection::Connection,
     error::Error,
-    json,
+    json::{ChampionDocument, IndividualDocument, PopulationDocument},
     progress::Progress,
     remote::{Remote, family},
 };
@@ -52,39 +52,36 @@ Examples:
 
 impl Remote for IndividualArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        progress.print(&document(&self.address, connection).await?)
-    }
-}
-
-async fn document(address: &NamedAddress, connection: &Connection) -> Result<String, Error> {
-    let address = connection.resolve(address).await?;
-    let (experiment, _) = connection.stored(address.experiment.0).await?;
-    let mut answer = connection.individuals(address, 0).await?;
-    let mut individuals = answer.individuals;
-    while let Some(next) = answer.next_individual {
-        answer = connection.individuals(address, next).await?;
-        individuals.append(&mut answer.individuals);
-    }
-    Ok(match (address.who, &individuals[..]) {
-        (Who::Generation(generation), individuals) => {
-            json::document(&json::PopulationDocument::new(&experiment, generation, individuals))
+        let address = connection.resolve(&self.address).await?;
+        let (experiment, _) = connection.stored(address.experiment.0).await?;
+        let mut answer = connection.individuals(address, 0).await?;
+        let mut individuals = answer.individuals;
+        while let Some(next) = answer.next_individual {
+            answer = connection.individuals(address, next).await?;
+            individuals.append(&mut answer.individuals);
         }
-        (Who::Champion, [champion]) => champion_document(&experiment, champion)?,
-        (_, [individual]) => {
-            let document = json::IndividualDocument::new(&experiment, individual);
-            json::document(&document.map_err(|error| not_json(&error))?)
+        match (address.who, &individuals[..]) {
+            (Who::Generation(generation), all) => {
+                progress.print_document(&PopulationDocument::new(&experiment, generation, all))
+            }
+            (Who::Champion, [champion]) => {
+                progress.print_document(&champion_document(&experiment, champion)?)
+            }
+            (_, [individual]) => {
+                let document = IndividualDocument::new(&experiment, individual);
+                progress.print_document(&document.map_err(|error| not_json(&error))?)
+            }
+            _ => Err(Error::Internal("the coordinator's answer is incomplete".into())),
         }
-        _ => return Err(Error::Internal("the coordinator's answer is incomplete".into())),
-    })
+    }
 }
 
 /// A champion in the format that `individual` prints and `run` stores.
-pub fn champion_document(
-    experiment: &Experiment,
-    champion: &GetChampionResponse,
-) -> Result<String, Error> {
-    let document = json::ChampionDocument::new(experiment, champion);
-    Ok(json::document(&document.map_err(|error| not_json(&error))?))
+pub fn champion_document<'a>(
+    experiment: &'a Experiment,
+    champion: &'a GetChampionResponse,
+) -> Result<ChampionDocument<'a>, Error> {
+    ChampionDocument::new(experiment, champion).map_err(|error| not_json(&error))
 }
 
 fn not_json(error: &serde_json::Error) -> Error {

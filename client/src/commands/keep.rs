@@ -21,7 +21,6 @@ use crate::{
     consent::Consent,
     error::Error,
     group::{Outcome, change_each, members},
-    json,
     place::Intent,
     progress::Progress,
     remote::{Remote, family},
@@ -242,7 +241,7 @@ impl Remote for GetArgs {
         let experiment_id = connection.one(&self.target.subject).await?.id;
         let request = GetExperimentRequest { experiment_id };
         let response = connection.call(async |client| client.get_experiment(request).await).await?;
-        progress.print(&json::document(&Json::parse(&response.config_json)))
+        progress.print_document(&Json::parse(&response.config_json))
     }
 }
 

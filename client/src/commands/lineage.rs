@@ -5,12 +5,18 @@ mod draw;
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use model::Address;
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
 
 use crate::{
-    address::NamedAddress, args::whole, complete, connection::Connection, error::Error, json,
-    progress::Progress, remote::Remote,
+    address::NamedAddress,
+    args::whole,
+    complete,
+    connection::Connection,
+    error::{Code, Error},
+    progress::Progress,
+    remote::Remote,
 };
 
 /// Print the ancestors of an individual of a genetic algorithm, and the genes inherited from
@@ -41,32 +47,62 @@ Examples:
   swarmctl lineage 3@40/7 --depth 6 --dot | dot -Tsvg > lineage.svg";
 
 /// A lineage, for programs.
-#[derive(Debug, Serialize)]
-struct LineageDocument<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct LineageDocument<'a> {
+    /// Address of the individual: ID@G/I.
     address: String,
+    /// One for each object that evolves.
     populations: Vec<PopulationDocument<'a>>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Population")]
 struct PopulationDocument<'a> {
+    /// Name of the population.
     population: &'a str,
+    /// The individual itself, then its ancestors by generation, the latest first.
     ancestors: Vec<AncestorDocument>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Ancestor")]
 struct AncestorDocument {
+    /// Its generation, from 0.
     generation: u64,
+    /// Its index in the generation, from 0.
     individual: u32,
+    /// Mean fitness of its trials; null if it is no finite number.
     fitness: Option<f64>,
-    operator: Option<&'static str>,
+    /// The operator that made it; null in the earliest generation of the lineage.
+    operator: Option<Operator>,
+    /// Its parents in the generation before.
     parents: Vec<ParentDocument>,
+    /// Number of its genes that mutated or blend both parents.
     new_genes: u32,
+    /// Number of genes of the individual that descend unchanged from this ancestor.
     genes: u32,
 }
 
-#[derive(Debug, Serialize)]
+/// An operator of a genetic algorithm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Operator {
+    /// Of the first generation.
+    First,
+    /// Unchanged, because it was among the best.
+    Elite,
+    /// A copy of one parent, with mutations.
+    Copy,
+    /// Of two parents, with mutations.
+    Crossover,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Parent")]
 struct ParentDocument {
+    /// Its index in the generation before, from 0.
     individual: u32,
+    /// Number of genes that come from it.
     genes: u32,
 }
 
@@ -74,22 +110,26 @@ impl Remote for LineageArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let address = connection.resolve(&self.address).await?;
         let GetLineageResponse { populations } = connection.lineage(address, self.depth).await?;
-        progress.print(&match (self.dot, progress.is_json()) {
-            (true, _) => draw::graph(&populations),
-            (_, true) => json::document(&LineageDocument::new(address, &populations)),
-            _ => draw::trees(&populations, address.experiment.0),
-        })
+        match (self.dot, progress.is_json()) {
+            (true, true) => {
+                let message = "--dot prints no JSON; leave out --output json";
+                Err(Error::at(Code::BadArgument, "--dot", message))
+            }
+            (true, false) => progress.print(&draw::graph(&populations)),
+            (false, true) => progress.print_document(&LineageDocument::new(address, &populations)),
+            (false, false) => progress.print(&draw::trees(&populations, address.experiment.0)),
+        }
     }
 }
 
 /// The operators that made an individual; none in the earliest generation of a lineage.
-fn operator(ancestor: &Ancestor) -> Option<&'static str> {
+fn operator(ancestor: &Ancestor) -> Option<Operator> {
     match ancestor.operator() {
         BirthOperator::Unspecified => None,
-        BirthOperator::First => Some("first"),
-        BirthOperator::Elite => Some("elite"),
-        BirthOperator::Copy => Some("copy"),
-        BirthOperator::Crossover => Some("crossover"),
+        BirthOperator::First => Some(Operator::First),
+        BirthOperator::Elite => Some(Operator::Elite),
+        BirthOperator::Copy => Some(Operator::Copy),
+        BirthOperator::Crossover => Some(Operator::Crossover),
     }
 }
 

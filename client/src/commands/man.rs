@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, CommandFactory as _};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::{
     cli::Args,
@@ -25,6 +27,13 @@ const HELP: &str = "\
 Examples:
   swarmctl man ~/.local/share/man/man1    # then: man swarmctl, man swarmctl-run";
 
+/// Written pages, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Written {
+    /// The directory of the pages.
+    directory: String,
+}
+
 /// Writes a page per command.
 pub fn man(args: &ManArgs, progress: &mut Progress) -> Result<(), Error> {
     let directory = &args.directory;
@@ -32,7 +41,11 @@ pub fn man(args: &ManArgs, progress: &mut Progress) -> Result<(), Error> {
     clap_mangen::generate_to(Args::command(), pages.unfinished())
         .map_err(|error| unwritable(directory, &error))?;
     pages.finish()?;
-    progress.print(&format!("manual pages are in {}", directory.display()))
+    let directory = directory.display().to_string();
+    match progress.is_json() {
+        true => progress.print_document(&Written { directory }),
+        false => progress.print(&format!("manual pages are in {directory}")),
+    }
 }
 
 #[cfg(test)]

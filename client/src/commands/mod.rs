@@ -1,6 +1,7 @@
 //! The commands: their arguments with their help, their requests and their output. Commands
 //! that send requests to a coordinator are declared in families, each at the top of a file.
 
+pub mod answers;
 mod backup;
 mod bench;
 mod champion_file;

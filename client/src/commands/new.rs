@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use model::group;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
     error::Error,
     examples::{self, Example},
-    json,
     output_file::Overwrite,
     progress::Progress,
 };
@@ -90,10 +90,13 @@ impl Example {
 }
 
 /// The written files.
-#[derive(Debug, Serialize)]
-struct Written<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Written<'a> {
+    /// Name of the experiment.
     name: &'a str,
+    /// Name of the example.
     task: &'a str,
+    /// Paths of the written files; the experiment file is the first.
     files: Vec<PathBuf>,
 }
 
@@ -115,7 +118,7 @@ fn new_in(directory: &Path, args: &NewArgs, progress: &mut Progress) -> Result<(
     unfinished.finish()?;
     let files: Vec<PathBuf> = files.into_iter().map(|(name, _)| name.into()).collect();
     if progress.is_json() {
-        return progress.print(&json::document(&Written { name, task: task.name, files }));
+        return progress.print_document(&Written { name, task: task.name, files });
     }
     let shown: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     progress.print(&format!(

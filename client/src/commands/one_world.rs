@@ -14,8 +14,13 @@ use tokio::{task::JoinSet, time::timeout};
 use tokio_util::sync::CancellationToken;
 use worker::WorkerConfig;
 
-use super::execute;
-use crate::{cli::Args, experiment_file::tests::quickstart, progress::tests::Captured};
+use super::{
+    answers::tests::{check, check_printed},
+    execute,
+};
+use crate::{
+    cli::Args, error::Answer, experiment_file::tests::quickstart, progress::tests::Captured,
+};
 
 /// A time limit that no command here reaches, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -160,12 +165,17 @@ pub async fn output(line: &str, place: &[&str]) -> String {
     let captured = Captured::default();
     let words = ["swarmctl"].into_iter().chain(line.split(' ')).chain(place.iter().copied());
     let args = Args::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
-    let progress = captured.progress(args.output);
+    let format = args.output;
+    let progress = captured.progress(format);
     let result = timeout(PATIENCE, execute(args, progress)).await;
     let result = result.unwrap_or_else(|_| panic!("{line} hangs: {:?}", captured.lines()));
+    check_printed(line, format, &captured.lines().join("\n"));
     let end = match result {
         Ok(()) => String::new(),
-        Err(error) => format!("[exit code {}] {error}", error.exit_code()),
+        Err(error) => {
+            check(&Answer::from(&error));
+            format!("[exit code {}] {error}", error.exit_code())
+        }
     };
     captured.lines().join("\n") + &end
 }

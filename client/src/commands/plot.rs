@@ -5,14 +5,13 @@ mod steps;
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::json;
 
 use crate::{
     connection::Connection,
     error::Error,
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
-    json,
     place::Intent,
     progress::Progress,
     recorded::{Run, Source},
@@ -64,14 +63,12 @@ pub async fn plot(
     let names = names(&runs);
     let function = common_function(&runs)?;
     figure(&runs, &names, function).write(&args.to, args.overwrite)?;
-    progress.print(&if progress.is_json() {
-        json::document(&Plotted::new(&runs, &names, &args.to))
-    } else {
-        let n_generations: usize = runs.iter().map(|run| run.points.len()).sum();
-        let runs =
-            if let [run] = &names[..] { run.clone() } else { format!("{} runs", runs.len()) };
-        format!("{runs}: {n_generations} generations in {}", args.to.display())
-    })
+    if progress.is_json() {
+        return progress.print_document(&Plotted::new(&runs, &names, &args.to));
+    }
+    let n_generations: usize = runs.iter().map(|run| run.points.len()).sum();
+    let runs = if let [run] = &names[..] { run.clone() } else { format!("{} runs", runs.len()) };
+    progress.print(&format!("{runs}: {n_generations} generations in {}", args.to.display()))
 }
 
 /// Draws a measure of an evaluation.
@@ -83,24 +80,36 @@ fn plot_steps(dir: &Path, args: &PlotArgs, progress: &mut Progress) -> Result<()
     figure.write(&args.to, args.overwrite)?;
     let conditions: Vec<&str> = figure.curves.iter().map(|curve| curve.name.as_str()).collect();
     let to = args.to.display();
-    progress.print(&if progress.is_json() {
-        json::document(&json!({"figure": to.to_string(), "conditions": conditions}))
-    } else {
-        format!("{}: {} in {to}", figure.y_label, conditions.join(", "))
-    })
+    match progress.is_json() {
+        true => progress.print_document(&PlottedSteps { figure: to.to_string(), conditions }),
+        false => progress.print(&format!("{}: {} in {to}", figure.y_label, conditions.join(", "))),
+    }
 }
 
-/// The contents of the figure, as JSON.
-#[derive(Debug, Serialize)]
-struct Plotted {
+/// A figure of fitness over generations, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Plotted {
+    /// Path of the figure.
     figure: String,
+    /// One for each curve.
     runs: Vec<PlottedRun>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct PlottedRun {
+    /// Name in the legend.
     name: String,
+    /// Number of generations that are drawn.
     generations: usize,
+}
+
+/// A figure of a measure over steps, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct PlottedSteps<'a> {
+    /// Path of the figure.
+    figure: String,
+    /// The condition of each curve.
+    conditions: Vec<&'a str>,
 }
 
 impl Plotted {

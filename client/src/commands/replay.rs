@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use experiment_file::limits;
+use schemars::JsonSchema;
+use serde::Serialize;
 use sim_core::{RoomRecord, StepRecord, TrialSet};
 use swarm_web::{Episode, Replay, ReplayError, Trials, replay_file};
 
@@ -69,6 +71,13 @@ Examples:
   swarmctl replay 3 --to swarm.svg --at 120
   swarmctl replay 3 --to swarm.png --at 0..200
   swarmctl replay --config experiment.json --genotype champion.json";
+
+/// A written replay or picture, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Written {
+    /// Path of the file.
+    file: String,
+}
 
 /// Simulates, and writes the file.
 pub async fn replay(
@@ -140,7 +149,11 @@ pub async fn replay(
         ),
     })?;
     args.overwrite.write(&path, &bytes)?;
-    progress.print(&path.display().to_string())
+    let file = path.display().to_string();
+    match progress.is_json() {
+        true => progress.print_document(&Written { file }),
+        false => progress.print(&file),
+    }
 }
 
 /// The requested trial of a judgement, or the median one; and a remark about it.

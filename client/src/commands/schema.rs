@@ -10,11 +10,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::answers;
 use crate::{
-    answers,
     error::{Code, Error},
     examples::EXAMPLES,
-    json,
     progress::Progress,
 };
 
@@ -50,6 +49,7 @@ Examples:
   swarmctl schema > experiment.schema.json
   swarmctl schema --key algorithm
   swarmctl schema --key world.objects.NAME.sensors --output json
+  swarmctl schema --of watch > watch.schema.json
   swarmctl schema --of error";
 
 /// One key of experiment files.
@@ -65,17 +65,17 @@ pub struct Explained {
 pub fn schema(args: &SchemaArgs, progress: &mut Progress) -> Result<(), Error> {
     if let Some(name) = &args.of {
         let schema = answers::schema_of(name).expect("the parser takes no other name");
-        return progress.print(&json::document(&schema));
+        return progress.print_document(&schema);
     }
     let schema = json_schema(ALGORITHMS);
-    let Some(key) = &args.key else { return progress.print(&json::document(&schema)) };
+    let Some(key) = &args.key else { return progress.print_document(&schema) };
     let facts = explain_key(&schema, key)
         .map_err(|error| Error::at(Code::UnknownKey, key, error.to_string()))?;
     let explained = Explained { example: example(&facts.key), facts };
-    progress.print(&match progress.is_json() {
-        true => json::document(&explained),
-        false => explained.to_text(),
-    })
+    match progress.is_json() {
+        true => progress.print_document(&explained),
+        false => progress.print(&explained.to_text()),
+    }
 }
 
 /// The keys that begin with a text.

@@ -8,6 +8,7 @@ mod trace;
 use std::{borrow::Cow, path::Path};
 
 use experiment_file::Seed;
+use schemars::JsonSchema;
 use serde::Serialize;
 use sim_core::{EpisodeSummary, EvaluateError, MeasureName, Measures};
 
@@ -15,7 +16,6 @@ use crate::{
     connection::Connection,
     error::{Code, Error},
     experiment_file::{Compiled, ExperimentFile},
-    json,
     place::Intent,
     progress::{Part, Progress},
     settings::Settings,
@@ -80,7 +80,7 @@ pub async fn simulate(
         trace_rows: n_rows,
     };
     match progress.is_json() {
-        true => progress.print(&json::document(&report)),
+        true => progress.print_document(&report),
         false => progress.print_parts(&report.to_parts()),
     }
 }
@@ -125,23 +125,33 @@ async fn subject(
 }
 
 /// The simulated experiment, with fitness and measures per trial.
-#[derive(Debug, Serialize)]
-struct SimulationReport<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Simulation")]
+pub struct SimulationReport<'a> {
+    /// Name of the experiment.
     name: &'a str,
+    /// The source of the genotype, for people.
     genotype: String,
     seed: Seed,
+    /// The generation of the worlds, from 0.
     generation: u64,
+    /// Number of steps of a trial.
     steps: u32,
+    /// In their order.
     trials: Vec<Trial>,
+    /// Means over the trials; for a measure, over the trials that have it.
     mean: EpisodeSummary,
+    /// Path of the recorded steps, with --trace only.
     #[serde(skip_serializing_if = "Option::is_none")]
     trace: Option<Cow<'a, str>>,
+    /// Number of rows of that file.
     #[serde(skip_serializing_if = "Option::is_none")]
     trace_rows: Option<u64>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Trial {
+    /// Number of the trial, from 0.
     trial: u32,
     #[serde(flatten)]
     summary: EpisodeSummary,

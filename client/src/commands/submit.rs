@@ -7,7 +7,7 @@ use crate::{
     args::{ExperimentArgs, whole},
     connection::{Connection, present},
     error::Error,
-    json,
+    json::{ExperimentDocument, OneOrMore},
     place::Intent,
     progress::Progress,
     remote::{Remote, family},
@@ -88,10 +88,12 @@ async fn submit(
     match (progress.is_json(), group) {
         (true, _) if is_followed => {}
         (true, Some(group)) => {
-            progress.print(&json::experiments(&Subject::Group(group.to_owned()), &submitted))?;
+            let submitted = submitted.iter().map(ExperimentDocument::from).collect();
+            let group = Subject::Group(group.to_owned());
+            progress.print_document(&OneOrMore::about(&group, submitted))?;
         }
         (true, None) => {
-            progress.print(&json::document(&json::ExperimentDocument::from(&submitted[0])))?;
+            progress.print_document(&ExperimentDocument::from(&submitted[0]))?;
         }
         (false, Some(group)) => {
             progress.print(&text::submitted_group(group, &submitted))?;

@@ -10,9 +10,13 @@ use swarm_proto::v1::{
     event::Kind,
 };
 
-use super::*;
+use super::{
+    answers::tests::{check, check_printed},
+    *,
+};
 use crate::{
     clock,
+    error::Answer,
     fake_coordinator::{FakeCoordinator, Script, state},
     help,
     progress::tests::Captured,
@@ -150,11 +154,17 @@ async fn transcript_on(width: Option<usize>, script: Script, lines: &[&str]) -> 
         let captured = Captured::default();
         let result = match Args::try_parse_from(at.into_iter().chain(line.split(' '))) {
             Ok(args) => {
+                let format = args.output;
                 let progress = match width {
-                    Some(width) => captured.progress_on(args.output, width),
-                    None => captured.progress(args.output),
+                    Some(width) => captured.progress_on(format, width),
+                    None => captured.progress(format),
                 };
-                execute(args, progress).await.map_err(|error| (error.exit_code(), error.report()))
+                let result = execute(args, progress).await;
+                check_printed(line, format, &captured.lines().join("\n"));
+                result.map_err(|error| {
+                    check(&Answer::from(&error));
+                    (error.exit_code(), error.report())
+                })
             }
             Err(error) => {
                 let text = with_suggestions(error).to_string();

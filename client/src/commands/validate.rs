@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use experiment_file::{ConfigError, Problem};
+use experiment_file::{ConfigError, Problem, Seed};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
     error::{Code, Error},
     experiment_file::{Compiled, ExperimentFile, Overrides},
-    json,
     progress::Progress,
 };
 
@@ -46,7 +46,7 @@ pub fn validate(args: &ValidateArgs, progress: &mut Progress) -> Result<(), Erro
         reports.push(report);
     }
     if progress.is_json() {
-        progress.print(&json::document(&reports))?;
+        progress.print_document(&reports)?;
     }
     let n_bad = reports.iter().filter(|report| !report.ok).count();
     let n_doubtful = reports.iter().filter(|report| !report.warnings.is_empty()).count();
@@ -66,30 +66,57 @@ pub fn validate(args: &ValidateArgs, progress: &mut Progress) -> Result<(), Erro
 }
 
 /// The problems and warnings of a file, and its summary if it is valid.
-#[derive(Debug, Serialize)]
-struct Report {
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Validation")]
+pub struct Report {
+    /// Path of the file.
     file: String,
+    /// Whether the file is valid.
     ok: bool,
+    /// Every mistake.
     #[serde(serialize_with = "problems")]
+    #[schemars(with = "Vec<Located<'_>>")]
     problems: Vec<Problem>,
+    /// Values that are allowed but rarely intended.
     #[serde(serialize_with = "problems")]
+    #[schemars(with = "Vec<Located<'_>>")]
     warnings: Vec<Problem>,
     #[serde(flatten)]
     summary: Option<Summary>,
 }
 
-/// The main values of a valid file.
-#[derive(Debug, Serialize)]
+/// The main values of a valid file; absent if it has mistakes.
+#[derive(Debug, Serialize, JsonSchema)]
 struct Summary {
+    /// Name of the experiment.
     name: String,
-    seed: u64,
+    seed: Seed,
+    /// Name of the algorithm.
     algorithm: String,
+    /// Number of individuals of a generation.
     population_size: u32,
+    /// Number of generations.
     generations: u64,
+    /// Number of trials of an individual.
     trials: u32,
+    /// Number of steps of a trial.
     steps: u32,
+    /// Number of robots of all objects.
     robots: u32,
+    /// Number of genes of an individual.
     genotype_len: usize,
+}
+
+/// A mistake or a warning.
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Problem")]
+struct Located<'a> {
+    /// The place in the file, such as algorithm.population_size; empty for the file as a whole.
+    path: &'a str,
+    /// The line of the file, from 1; null if it is unknown.
+    line: Option<usize>,
+    /// What is wrong, and what is allowed.
+    message: &'a str,
 }
 
 impl Report {
@@ -112,7 +139,7 @@ impl Summary {
         let Compiled { config, experiment, .. } = compiled;
         Self {
             name: config.name.clone(),
-            seed: config.seed,
+            seed: Seed(config.seed),
             algorithm: config.algorithm.name.clone(),
             population_size: config.algorithm.population_size,
             generations: config.algorithm.generations,
@@ -136,12 +163,6 @@ impl std::fmt::Display for Summary {
 
 /// Problems as JSON.
 fn problems<S: serde::Serializer>(problems: &[Problem], serializer: S) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct Located<'a> {
-        path: &'a str,
-        line: Option<usize>,
-        message: &'a str,
-    }
     serializer.collect_seq(problems.iter().map(|Problem { path, line, message }| Located {
         path,
         line: *line,

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use bundle::{Bundle, Claim, Flaw, Proof, Sample, Verification};
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::export;
 use crate::{
-    args::IsaArgs, error::Error, json, progress::Progress, resimulation::Resimulation,
+    args::IsaArgs, error::Error, progress::Progress, resimulation::Resimulation,
     settings::Settings, waiting,
 };
 
@@ -52,17 +53,26 @@ fn sample(text: &str) -> Result<Sample, String> {
 }
 
 /// The result, for programs.
-#[derive(Debug, Serialize)]
-struct Report {
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Verification")]
+pub struct Report {
+    /// Path of the bundle.
     file: String,
+    /// SHA-256 of the bundle, 64 hexadecimal digits.
     sha256: String,
+    /// The claims that are true.
     proven: Vec<Line>,
+    /// What the command has not proved, and why.
     unproven: Vec<String>,
 }
 
-#[derive(Debug, Serialize)]
+/// A claim that is true.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Proven")]
 struct Line {
+    /// The claim.
     claim: String,
+    /// What proves it.
     what: String,
 }
 
@@ -99,7 +109,10 @@ pub async fn verify(
         proven: proven.into_iter().map(line).collect(),
         unproven,
     };
-    progress.print(&if progress.is_json() { json::document(&report) } else { report.to_text() })
+    match progress.is_json() {
+        true => progress.print_document(&report),
+        false => progress.print(&report.to_text()),
+    }
 }
 
 impl Report {

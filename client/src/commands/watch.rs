@@ -164,17 +164,16 @@ pub async fn watch(
             }
             _ => None,
         };
-        progress.print(&if progress.is_json() {
+        if progress.is_json() {
             let file = champion_file.as_deref().map(Path::to_string_lossy);
             let end = json::EndLine::new(experiment, champion.as_ref());
-            json::line(&end.with_champion_file(file.as_deref()))
-        } else {
-            let mut lines =
-                vec![text::end(experiment, *first_best, champion.as_ref(), progress.is_verbose())];
-            lines
-                .extend(data_dir.map(|directory| text::files(directory, champion_file.as_deref())));
-            lines.join("\n")
-        })?;
+            progress.print_line(&end.with_champion_file(file.as_deref()))?;
+            continue;
+        }
+        let mut lines =
+            vec![text::end(experiment, *first_best, champion.as_ref(), progress.is_verbose())];
+        lines.extend(data_dir.map(|directory| text::files(directory, champion_file.as_deref())));
+        progress.print(&lines.join("\n"))?;
     }
     compare_group(connection, &all, progress).await?;
     all.iter().try_for_each(|followed| success(&followed.experiment))

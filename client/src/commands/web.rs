@@ -4,6 +4,8 @@ use std::{net::SocketAddr, sync::Arc};
 
 use clap::Args;
 use model::queries::Reader;
+use schemars::JsonSchema;
+use serde::Serialize;
 use swarm_transport::listen_address;
 use swarm_web::Site;
 use tokio::net::TcpListener;
@@ -38,6 +40,13 @@ Examples:
   swarmctl web
   swarmctl web --data-dir backups/today";
 
+/// Pages that are served until an interrupt, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Served {
+    /// The address, with a secret that gives access.
+    address: String,
+}
+
 /// Serves until an interrupt.
 pub async fn web(
     settings: &Settings,
@@ -59,7 +68,11 @@ pub async fn web(
     let listener = TcpListener::bind(listen).await.map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
     let token = random_token();
-    progress.print(&login_address(address, &token))?;
+    let address = login_address(address, &token);
+    match progress.is_json() {
+        true => progress.print_line(&Served { address })?,
+        false => progress.print(&address)?,
+    }
     let site = Site { reader: Arc::new(reader), control: None, token: Some(token), tls: None };
     site.serve(listener, interrupt).await.map_err(cannot)
 }

@@ -3,6 +3,7 @@
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use console::Style;
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{ListWorkersRequest, ReadmitWorkerRequest, Worker};
 
@@ -34,20 +35,34 @@ const CSV_KEYS: [&str; 13] = [
 ];
 
 /// A connected worker, for JSON and CSV.
-#[derive(Debug, Serialize)]
-struct Record<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Worker")]
+pub struct Record<'a> {
+    /// Number of the connection.
     id: u64,
+    /// Name of the worker, which other workers may have, too.
     name: &'a str,
+    /// Version of the program; empty if it does not say so.
     version: &'a str,
+    /// Number of items that it computes at a time.
     slots: u32,
+    /// Number of items that it has.
     items_in_flight: u32,
+    /// Results per second in the last minute.
     results_per_second: f64,
+    /// Share of the last minute in which its slots had nothing to compute, from 0 to 1.
     idle_share: f64,
+    /// Time of the connection, milliseconds since 1970 in UTC.
     connected_at_ms: u64,
+    /// Time of its last message, milliseconds since 1970 in UTC.
     last_heard_at_ms: u64,
+    /// Whether it finishes its items and leaves.
     draining: bool,
+    /// Why it is in quarantine; null if it is not.
     distrusted: Option<&'a str>,
+    /// Why it gets no items for now; null if it gets some.
     waits: Option<&'a str>,
+    /// The pattern of the names of experiments whose items it computes; null if it computes all.
     experiments: Option<&'a str>,
 }
 

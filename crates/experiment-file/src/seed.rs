@@ -1,7 +1,8 @@
 //! Seeds in JSON: a number if every program reads it exactly, otherwise text.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 /// Largest seed that is a number in JSON, because JavaScript and jq round larger ones.
@@ -17,6 +18,22 @@ impl Seed {
     pub fn from_digits(text: &str) -> Option<Self> {
         let is_plain = text.bytes().all(|byte| byte.is_ascii_digit());
         text.parse().ok().filter(|_| is_plain).map(Self)
+    }
+}
+
+impl JsonSchema for Seed {
+    fn schema_name() -> Cow<'static, str> {
+        "Seed".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "A seed: a number up to 2^53, or a larger one as a text of its digits.",
+            "oneOf": [
+                {"type": "integer", "minimum": 0, "maximum": NUMBER_MAX},
+                {"type": "string", "pattern": "^[0-9]{16,20}$"},
+            ],
+        })
     }
 }
 

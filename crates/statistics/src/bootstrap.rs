@@ -3,6 +3,7 @@
 
 use rand::RngExt as _;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng as _};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::quantile;
@@ -16,12 +17,14 @@ const SEED: u64 = 0;
 const LEAST: usize = 3;
 
 /// A statistic and its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Interval {
     /// The statistic of the sample itself.
+    #[schemars(with = "Option<f64>")]
     pub value: f64,
-    /// Lower and upper end of the interval; `None` if a sample has fewer than three runs, which
+    /// Lower and upper end of the 95 % interval; null if a sample has fewer than three runs, which
     /// are too few to resample.
+    #[schemars(with = "Option<[Option<f64>; 2]>")]
     pub ci95: Option<[f64; 2]>,
 }
 

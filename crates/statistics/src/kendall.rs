@@ -2,13 +2,14 @@
 
 use std::f64::consts::SQRT_2;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Largest number of pairs of values for an exact p-value, if no values are equal.
 const EXACT_MAX: usize = 33;
 
 /// How far two orders agree.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Kendall {
     /// Tau-b, from -1, opposite orders, to 1, the same order.
     pub tau: f64,

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use indexmap::IndexMap;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use statistics::{Kendall, kendall};
@@ -59,9 +60,14 @@ struct WorstTenth {
     mean: f64,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize, Serialize)]
+/// The nominal fitness minus that in the realities.
+#[derive(Debug, Clone, Copy, Deserialize, Serialize, JsonSchema)]
 struct Drop {
+    /// The difference of the means.
+    #[schemars(with = "Option<f64>")]
     value: f64,
+    /// Lower and upper end of the 95 % interval; null if there are too few realities.
+    #[schemars(with = "Option<[Option<f64>; 2]>")]
     ci95: Option<[f64; 2]>,
 }
 
@@ -71,23 +77,30 @@ struct Reality {
 }
 
 /// Champions in the order of the command line, and how far their rankings agree.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Ranking {
+    /// In the order of the command line.
     champions: Vec<Champion>,
-    /// `None` if all champions are equally good in one of the two rankings.
+    /// Null if all champions are equally good in one of the two rankings.
     kendall: Option<Kendall>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Champion {
-    /// The directory.
+    /// The directory of the evaluation.
     evaluation: String,
+    /// Mean fitness without pseudo-reality.
+    #[schemars(with = "Option<f64>")]
     nominal: f64,
     /// From 1, the best; equally good champions share the smallest rank.
     nominal_rank: usize,
     /// Mean fitness over the realities.
+    #[schemars(with = "Option<f64>")]
     mean: f64,
+    /// Its rank by that mean, from 1.
     rank: usize,
+    /// Mean fitness in the worst tenth of the realities.
+    #[schemars(with = "Option<f64>")]
     worst_tenth: f64,
     drop: Drop,
 }

@@ -1,5 +1,6 @@
 //! The result of a comparison, as numbers and as text.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use statistics::{
     Interval, interquartile_mean, interval, interval_of_two, mann_whitney, mean, median,
@@ -15,45 +16,56 @@ use crate::{
 use super::samples::{RecordedRun, Sample};
 
 /// All quantities that are compared.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Comparison")]
 pub struct Report {
+    /// What is compared.
     quantities: Vec<Quantity>,
 }
 
 /// A number of each run, in all samples.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Quantity {
+    /// `judged`, `mean`, `best`, `generations_to_target` or `episodes_to_target`.
     name: &'static str,
     /// For people.
     #[serde(skip)]
     title: String,
     /// Whether smaller values are better.
     less_is_better: bool,
-    /// Smallest and largest number of averaged generations of a run.
+    /// Smallest and largest number of averaged generations of a run; absent if none are averaged.
     #[serde(skip_serializing_if = "Option::is_none")]
     averaged: Option<[u64; 2]>,
+    /// The samples that have the quantity.
     samples: Vec<Summary>,
+    /// Each sample with each that comes after it.
     pairs: Vec<Pair>,
 }
 
 /// A number of each run of a sample.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Sample")]
 struct Summary {
+    /// Name of the sample.
     sample: String,
     /// In the order of the seeds; infinite numbers are null.
+    #[schemars(with = "Vec<Option<f64>>")]
     values: Vec<f64>,
     median: Interval,
+    /// The interquartile mean.
     iqm: Interval,
 }
 
 /// Two samples.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Pair {
+    /// Name of a sample.
     first: String,
+    /// Name of another sample.
     second: String,
     /// The probability that a run of the first is better than one of the second.
     probability_of_improvement: Interval,
-    /// Two-sided, of the Mann-Whitney test.
+    /// Two-sided p-value of the Mann-Whitney test, from 0 to 1.
     p: f64,
 }
 

@@ -7,6 +7,7 @@ use experiment_file::{
     RobotController, SensorQuery,
 };
 use indexmap::IndexMap;
+use schemars::JsonSchema;
 use serde::Serialize;
 use statistics::{Interval, interval_of_crossed, mean};
 
@@ -156,42 +157,57 @@ const METHOD: &str = "drop: 95 % percentile interval of the pigeonhole bootstrap
                       trials; all differences are paired by trial";
 
 /// What pseudo-realities cost a genotype: `pseudo_realities` of summary.json.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Robustness {
+    /// The range of each key of `pseudo_reality` that matters, [low, high], or its one value.
     ranges: IndexMap<&'static str, Json>,
-    /// `file` or `defaults`.
+    /// Who states the ranges: `file` or `defaults`.
     ranges_of: &'static str,
     /// Mean fitness without pseudo-reality.
+    #[schemars(with = "Option<f64>")]
     nominal: f64,
     /// Mean fitness over all realities.
+    #[schemars(with = "Option<f64>")]
     mean: f64,
     worst_tenth: WorstTenth,
     /// The nominal fitness minus that in the realities.
     drop: Interval,
     /// What each range costs alone, the largest drop first.
     causes: Vec<Cause>,
+    /// All realities.
     realities: Vec<Reality>,
+    /// How the intervals are made.
     method: &'static str,
 }
 
 /// The tenth of the realities in which the fitness is lowest, rounded up to whole realities.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct WorstTenth {
+    /// Number of realities.
     realities: usize,
+    /// Mean fitness over these realities.
+    #[schemars(with = "Option<f64>")]
     mean: f64,
 }
 
-#[derive(Debug, Clone, Serialize)]
+/// What a range costs alone.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct Cause {
+    /// A key of `pseudo_reality`.
     key: &'static str,
+    /// The nominal fitness minus that with the range.
     drop: Interval,
 }
 
-#[derive(Debug, Clone, Serialize)]
+/// A world that was drawn.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct Reality {
+    /// `reality` and its number, from 0.
     name: String,
+    /// The drawn value of each key.
     numbers: IndexMap<&'static str, Json>,
     /// Mean fitness.
+    #[schemars(with = "Option<f64>")]
     fitness: f64,
 }
 

@@ -4,6 +4,7 @@
 use std::fmt;
 
 use evolution::{between, deviation, finite_mean, interval::interval};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::text::number;
@@ -12,10 +13,13 @@ use crate::text::number;
 const Z: f64 = 1.959_963_984_540_054;
 
 /// Median and quartiles, by linear interpolation between the sorted values.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Quartiles {
+    /// The median.
     pub median: f64,
+    /// The lower quartile.
     pub q1: f64,
+    /// The upper quartile.
     pub q3: f64,
 }
 
@@ -35,22 +39,24 @@ impl Quartiles {
 }
 
 /// Statistics of a sample, and confidence intervals of its mean.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Estimate {
     /// Size of the sample.
     pub n: usize,
+    /// Mean of the sample.
     pub mean: f64,
     /// Standard deviation of the sample, with n - 1 in its denominator; 0 for n = 1.
     pub standard_deviation: f64,
-    /// 95 % confidence interval of the mean, by empirical likelihood: see
-    /// [`evolution::interval`].
+    /// Lower and upper end of the 95 % confidence interval of the mean, by empirical likelihood.
     pub ci95: [f64; 2],
     /// For shares only: mean -+ z sqrt(mean (1 - mean) / n), Eq. 6.1 of the thesis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proportion_ci95: Option<[f64; 2]>,
     #[serde(flatten)]
     pub quartiles: Quartiles,
+    /// The least value.
     pub min: f64,
+    /// The greatest value.
     pub max: f64,
 }
 

@@ -1,9 +1,9 @@
 //! The summary: the subject of an evaluation, and estimates of its fitness and measures.
 
-use experiment_file::Seed;
+use experiment_file::{FitnessFunction, Seed};
 use indexmap::IndexMap;
+use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
 use crate::change::Json;
@@ -17,18 +17,23 @@ use super::{
 };
 
 /// The evaluated genotype and experiment.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Subject {
+    /// Name of the experiment.
     name: String,
+    /// The version of swarmctl.
     swarmctl: &'static str,
+    /// The version of the simulation.
     simulation: &'static str,
-    /// SHA-256 of the genes, each as little-endian f64.
+    /// SHA-256 of the genes, each as little-endian f64; 64 hexadecimal digits.
     genotype_digest: String,
+    /// Number of genes.
     genes: usize,
-    fitness_function: Value,
+    fitness_function: FitnessFunction,
     seed: Seed,
-    /// The trial set: the trials of evaluations.
+    /// The set of the trials.
     trials_of: String,
+    /// Number of steps of a trial.
     steps: u32,
 }
 
@@ -46,8 +51,7 @@ impl Subject {
             simulation: sim_core::FINGERPRINT,
             genotype_digest: digest.iter().map(|byte| format!("{byte:02x}")).collect(),
             genes: genotype.len(),
-            fitness_function: serde_json::to_value(algorithm.fitness_function)
-                .expect("a name serialises"),
+            fitness_function: algorithm.fitness_function,
             seed: Seed(config.seed),
             trials_of: sim_core::TrialSet::Evaluation.to_string(),
             steps: algorithm.evaluation_steps,
@@ -56,37 +60,46 @@ impl Subject {
 }
 
 /// The file summary.json.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[schemars(rename = "Evaluation")]
 pub struct Summary {
     #[serde(flatten)]
     subject: Subject,
+    /// The first is the nominal one.
     pub conditions: Vec<ConditionSummary>,
+    /// With --pseudo-realities only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pseudo_realities: Option<Robustness>,
 }
 
 /// The results of one condition.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[schemars(rename = "Condition")]
 pub struct ConditionSummary {
+    /// Name of the condition.
     pub name: String,
-    /// Digest of the changed experiment file, as the coordinator shows it.
+    /// Digest of the changed experiment file, as the coordinator shows it; 64 hexadecimal digits.
     config_digest: String,
+    /// The changed values, by their places in the experiment file.
     changes: IndexMap<String, Json>,
+    /// Number of robots.
     robots: u32,
+    /// Estimate of the fitness.
     pub fitness: Estimate,
     /// The measures that have a value, by name.
     pub metrics: IndexMap<String, MetricSummary>,
 }
 
 /// The results of one measure.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[schemars(rename = "Metric")]
 pub struct MetricSummary {
-    /// Absent for the measures of a script, which declares no unit.
+    /// The unit; absent for the measures of a script, which declares no unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     unit: Option<&'static str>,
     /// Estimate of the mean over the steps.
     pub time_mean: Estimate,
-    /// Estimate of the value in the last step.
+    /// Estimate of the value in the last step; absent if no trial has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     end: Option<Estimate>,
 }

@@ -1,5 +1,6 @@
 //! The state of the whole fleet, and the reasons why its experiments wait.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{
     ExperimentState, ExplainExperimentResponse, ListExperimentsRequest, ListWorkersRequest,
@@ -8,26 +9,36 @@ use swarm_proto::v1::{
 
 use super::{Explanation, explain};
 use crate::{
-    clock, connection::Connection, error::Error, finding::Finding, json, progress::Progress, text,
+    clock, connection::Connection, error::Error, finding::Finding, progress::Progress, text,
 };
 
-/// The fleet, as JSON.
-#[derive(Debug, Serialize)]
-struct Fleet<'a> {
+/// The fleet, for programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Fleet<'a> {
+    /// Number of connected workers.
     workers: usize,
+    /// Number of their slots, each of which computes one item at a time.
     slots: u64,
+    /// The unfinished evaluations.
     evaluations: Vec<Evaluation<'a>>,
+    /// The experiments that have not ended.
     experiments: Vec<Explanation<'a>>,
 }
 
-/// An unfinished evaluation, as JSON.
-#[derive(Debug, Serialize)]
+/// An unfinished evaluation.
+#[derive(Debug, Serialize, JsonSchema)]
 struct Evaluation<'a> {
+    /// Name of the experiment that it evaluates.
     name: &'a str,
+    /// Number of its episodes.
     episodes: u64,
+    /// Number of episodes that are not done.
     episodes_left: u64,
+    /// Number of items without a worker.
     items_queued: u32,
+    /// Number of workers that may compute it.
     workers_available: u32,
+    /// Time since its beginning, milliseconds.
     running_ms: u64,
 }
 
@@ -85,12 +96,12 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
             Some(Explanation { experiment: answer.experiment.as_ref()?.into(), findings })
         });
         let experiments = experiments.collect();
-        return progress.print(&json::document(&Fleet {
+        return progress.print_document(&Fleet {
             workers: workers.len(),
             slots,
             evaluations: evaluations.iter().map(Into::into).collect(),
             experiments,
-        }));
+        });
     }
     let n_unfinished = match explained.len() {
         0 => "all experiments have ended".to_owned(),

@@ -1,5 +1,6 @@
 //! The movement of evolution, as a table.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{Experiment, GenerationDynamics};
 
@@ -24,19 +25,31 @@ const CSV_KEYS: [&str; 10] = [
     "rank_correlation",
 ];
 
-/// The movement of a generation; null if the algorithm has no distribution.
-#[derive(Debug, Serialize)]
-struct Record {
+/// The movement of a generation. Step, way and deviations are null if the algorithm has no
+/// distribution.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Dynamics")]
+pub struct Record {
+    /// Number of the experiment.
     experiment: u64,
+    /// Number of the generation, from 0.
     generation: u64,
+    /// Distance from the mean of the distribution to the next one, in genes.
     mean_step: Option<f64>,
-    /// Length of the way of the mean up to this generation.
+    /// Length of the way of the mean up to this generation, in genes.
     mean_path: Option<f64>,
+    /// Least standard deviation of a gene.
     deviation_min: Option<f64>,
+    /// Lower quartile of the genes' standard deviations.
     deviation_q1: Option<f64>,
+    /// Median of the genes' standard deviations.
     deviation_median: Option<f64>,
+    /// Upper quartile of the genes' standard deviations.
     deviation_q3: Option<f64>,
+    /// Greatest standard deviation of a gene.
     deviation_max: Option<f64>,
+    /// Spearman's rank correlation of fitness between trials, the mean over pairs of trials, from
+    /// -1 to 1; null for a single trial.
     rank_correlation: Option<f64>,
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use swarm_proto::v1::{Ancestor, PopulationLineage};
 
-use super::operator;
+use super::{Operator, operator};
 use crate::text;
 
 /// Ancestors by generation and index.
@@ -45,7 +45,7 @@ impl Tree<'_> {
         let is_new = self.shown.insert(place);
         let again = if is_new || of.parents.is_empty() { "" } else { ", see above" };
         let born = match operator(of) {
-            Some("crossover") => format!(
+            Some(Operator::Crossover) => format!(
                 ", crossover of {}, {} new",
                 of.parents
                     .iter()
@@ -54,9 +54,9 @@ impl Tree<'_> {
                     .join(" and "),
                 of.new_genes
             ),
-            Some("copy") => format!(", copy with {} new", of.new_genes),
-            Some("elite") => ", elite".to_owned(),
-            Some(_) => ", first generation".to_owned(),
+            Some(Operator::Copy) => format!(", copy with {} new", of.new_genes),
+            Some(Operator::Elite) => ", elite".to_owned(),
+            Some(Operator::First) => ", first generation".to_owned(),
             None => String::new(),
         };
         self.lines.push(format!(

@@ -9,7 +9,7 @@ mod merge;
 use std::{collections::BTreeMap, path::Path};
 
 use model::wire::has_ended;
-use swarm_proto::v1::{Event, Experiment, WatchNewsResponse};
+use swarm_proto::v1::{Experiment, WatchNewsResponse};
 use tokio::time::{Instant, sleep};
 use tonic::Streaming;
 
@@ -62,7 +62,11 @@ pub async fn print(
         let mut merge = Merge::new(&connection, with_news.collect());
         while let Some((experiment, event)) = merge.next().await? {
             positions.insert(experiment.id, event.sequence + 1);
-            progress.print(&line(experiment, &event, progress.is_json()))?;
+            if progress.is_json() {
+                progress.print_line(&json::LogLine::new(experiment, &event))?;
+            } else {
+                progress.print(&text::log_line(experiment, &event))?;
+            }
         }
         let is_over = wanted.subject.is_some() && experiments.iter().all(|e| has_ended(e.state()));
         if !wanted.follow || is_over {
@@ -146,13 +150,5 @@ async fn chosen(
     match subject {
         Some(subject) => connection.subject(subject).await,
         None => connection.experiments().await,
-    }
-}
-
-fn line(experiment: &Experiment, event: &Event, is_json: bool) -> String {
-    if is_json {
-        json::line(&json::LogLine::new(experiment, event))
-    } else {
-        text::log_line(experiment, event)
     }
 }

@@ -43,11 +43,11 @@ pub async fn wait(
             Some(at) => timeout_at(at, ended).await.map_err(|_| Error::TimedOut { id })?,
             None => ended.await,
         }?;
-        progress.print(&if progress.is_json() {
-            json::line(&json::ExperimentDocument::from(&experiment))
+        if progress.is_json() {
+            progress.print_line(&json::ExperimentDocument::from(&experiment))?;
         } else {
-            text::state_line(&experiment)
-        })?;
+            progress.print(&text::state_line(&experiment))?;
+        }
         if end == WaitFor::Completed {
             outcome = outcome.and(success(&experiment));
         }
