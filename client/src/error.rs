@@ -21,7 +21,7 @@ use crate::{
 
 pub use self::{
     answer::{Answer, wants_json},
-    code::Code,
+    code::{Code, EXIT_CODES},
 };
 
 /// Why a command did not succeed.

@@ -6,7 +6,7 @@ use std::{env, ffi::OsString};
 use clap::{ArgMatches, Command, CommandFactory as _, Subcommand as _, error::Error};
 
 use crate::{
-    cli::{Args, EXAMPLES, MORE, WIDTH_MAX},
+    cli::{Args, EXAMPLES, WIDTH_MAX, more},
     commands::{
         control::Control, fleet::Fleet, individual::Measure, keep::Keep, look::Look, submit::Evolve,
     },
@@ -124,7 +124,7 @@ fn definition(extent: Extent, width: Option<usize>) -> Command {
         .override_usage("swarmctl [OPTIONS] <COMMAND>")
         .help_template(template)
         .after_help(EXAMPLES)
-        .after_long_help(format!("{EXAMPLES}\n\n{MORE}"))
+        .after_long_help(format!("{EXAMPLES}\n\n{}", more()))
 }
 
 /// A command and its subcommands, with these options in the help.
