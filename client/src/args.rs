@@ -83,9 +83,7 @@ impl ExperimentArgs {
     pub fn file(&self) -> Result<ExperimentFile, Error> {
         match (&self.config, self.example) {
             (_, Some(example)) => Ok(example.file()),
-            (Some(path), None) => {
-                ExperimentFile::read(path).map_err(|error| Error::invalid(path, &error))
-            }
+            (Some(path), None) => ExperimentFile::read(path),
             (None, None) => unreachable!("the command line requires one of them"),
         }
     }

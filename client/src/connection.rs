@@ -27,7 +27,7 @@ use tonic::{
 
 use crate::{
     defaults::DEFAULT_DATA_DIR,
-    error::{Error, is_transient, reason},
+    error::{Code, Error, is_transient, reason},
     local::services::{self, Door, InProcess},
     place::{Intent, Place},
     progress::Progress,
@@ -127,8 +127,8 @@ impl Connection {
 
     /// A connection to the coordinator at an address.
     pub fn new(address: &str, credentials: &Credentials) -> Result<Self, Error> {
-        let link =
-            Link::new(address, credentials).map_err(|error| Error::Input(error.to_string()))?;
+        let link = Link::new(address, credentials)
+            .map_err(|error| Error::at(Code::BadInput, address, error.to_string()))?;
         let channel = endpoint(&link).timeout(CALL_TIMEOUT).connect_lazy();
         Ok(Self::on(address.into(), Way::Link(Box::new(link)), &channel))
     }

@@ -13,23 +13,11 @@ use swarm_proto::v1::SubmitExperimentRequest;
 use crate::{
     change::{Change, Json, apply_all},
     clock,
-    error::{Error, prefix_lines},
+    error::{Code, Error, prefix_lines},
     file_kind::{self, Kind},
     input::{is_stdin, read_text},
     interrupt, json,
 };
-
-/// The beginning of the problem of a file that cannot be read.
-const UNREADABLE: &str = "cannot be read: ";
-
-/// Whether these are the problems of a file that cannot be read, or is of another kind.
-pub fn is_unreadable(problems: &[Problem]) -> bool {
-    let is_whole = |problem: &Problem| problem.path.is_empty() && problem.line.is_none();
-    let begins = |problem: &Problem| {
-        [UNREADABLE, file_kind::OTHER].iter().any(|start| problem.message.starts_with(start))
-    };
-    matches!(problems, [one] if is_whole(one) && begins(one))
-}
 
 /// The text of an experiment file.
 #[derive(Debug, Clone)]
@@ -81,18 +69,15 @@ impl ExperimentFile {
 
     /// Reads a file of UTF-8 text of at most 1 MiB; `-` is standard input. Includes the
     /// script that the file names by a path relative to its folder.
-    pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let problem = |path: &str, what: String| ConfigError {
-            problems: vec![Problem {
-                path: path.into(),
-                line: None,
-                message: format!("{UNREADABLE}{what}"),
-            }],
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let problem = |code, key: &str, message: String| {
+            let problems = vec![Problem { path: key.into(), line: None, message }];
+            Error::Config { code, file: path.into(), problems }
         };
-        file_kind::expect(path, &[Kind::Experiment], "an experiment file")
-            .map_err(|message| ConfigError { problems: vec![unlocated(message)] })?;
-        let text =
-            read_text(path, limits::FILE_BYTES).map_err(|error| problem("", error.to_string()))?;
+        let unreadable = |message| problem(Code::UnreadableFile, "", message);
+        file_kind::expect(path, &[Kind::Experiment], "an experiment file").map_err(unreadable)?;
+        let text = read_text(path, limits::FILE_BYTES)
+            .map_err(|error| unreadable(format!("cannot be read: {error}")))?;
         let Some((script, place)) = script_path(&text) else {
             return Ok(Self { path: path.into(), text });
         };
@@ -100,7 +85,8 @@ impl ExperimentFile {
         let name = script.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let script = ScriptConfig {
             text: read_text(&script, limits::SCRIPT_BYTES).map_err(|what| {
-                problem("task.script", format!("`{}`: {what}", script.display()))
+                let what = format!("cannot be read: `{}`: {what}", script.display());
+                problem(Code::InvalidExperiment, "task.script", what)
             })?,
             name,
         };
@@ -175,7 +161,8 @@ impl ExperimentFile {
                 if !self.text.trim_end().contains('\n') {
                     problems.iter_mut().for_each(|problem| problem.line = None);
                 }
-                Error::Config { file: self.path.clone(), problems }
+                let code = Code::InvalidExperiment;
+                Error::Config { code, file: self.path.clone(), problems }
             }
             error => error,
         }
@@ -299,7 +286,8 @@ pub mod tests {
         fs::write(&huge, vec![b' '; (1 << 20) + 1]).unwrap();
         for path in [dir.path(), &missing, &binary, &huge] {
             let error = ExperimentFile::read(path).unwrap_err();
-            assert!(error.to_string().starts_with("cannot be read: "), "{error}");
+            assert_eq!(error.code(), Code::UnreadableFile);
+            assert!(error.report().contains(": cannot be read: "), "{}", error.report());
         }
         let largest = dir.path().join("largest");
         fs::write(&largest, vec![b' '; 1 << 20]).unwrap();

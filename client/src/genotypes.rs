@@ -26,7 +26,8 @@ impl Connection {
     /// One experiment, and its file in canonical form.
     pub async fn stored(&self, experiment_id: u64) -> Result<(Experiment, String), Error> {
         let request = GetExperimentRequest { experiment_id };
-        let response = self.call(async |client| client.get_experiment(request).await).await?;
+        let response = self.call(async |client| client.get_experiment(request).await).await;
+        let response = response.map_err(|error| error.about(experiment_id))?;
         Ok((present(response.experiment)?, response.config_json))
     }
 
@@ -36,16 +37,20 @@ impl Connection {
         address: Address,
         from_individual: u32,
     ) -> Result<GetIndividualsResponse, Error> {
-        let address = address.to_string();
-        let request =
-            GetIndividualsRequest { address, from_individual, ..GetIndividualsRequest::default() };
-        self.call(async |client| client.get_individuals(request.clone()).await).await
+        let request = GetIndividualsRequest {
+            address: address.to_string(),
+            from_individual,
+            ..GetIndividualsRequest::default()
+        };
+        let answer = self.call(async |client| client.get_individuals(request.clone()).await).await;
+        answer.map_err(|error| error.about(address))
     }
 
     /// The lineage of an individual.
     pub async fn lineage(&self, address: Address, depth: u32) -> Result<GetLineageResponse, Error> {
         let request = GetLineageRequest { address: address.to_string(), depth };
-        self.call(async |client| client.get_lineage(request.clone()).await).await
+        let answer = self.call(async |client| client.get_lineage(request.clone()).await).await;
+        answer.map_err(|error| error.about(address))
     }
 
     /// An address with the number of its experiment.

@@ -67,9 +67,10 @@ pub async fn change_each<T>(
             Ok(result) => changed.push(result),
             // A single error is printed without a list.
             Err(error) if members.len() == 1 => {
-                return Outcome { changed, failure: Some(error) };
+                return Outcome { changed, failure: Some(error.about(experiment.id)) };
             }
             Err(error) => {
+                let error = error.about(experiment.id);
                 let ends = error.concerns_all();
                 lines.push(format!("{}: {error}", text::title(experiment)));
                 first.get_or_insert(error);

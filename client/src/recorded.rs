@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer};
-use swarm_proto::v1::{Experiment, GenerationSummary, GetExperimentRequest};
+use swarm_proto::v1::{Experiment, GenerationSummary};
 
 use crate::{
     connection::{Connection, present},
@@ -89,12 +89,12 @@ impl Run {
             generations.push(GenerationFitness { generation, best, mean, min, episodes });
         }
         let source = format!("experiment {experiment_id}");
-        let request = GetExperimentRequest { experiment_id };
-        let stored = connection.call(async |client| client.get_experiment(request).await).await?;
-        let function = fitness_function(&stored.config_json);
+        let (_, config_json) = connection.stored(experiment_id).await?;
+        let function = fitness_function(&config_json);
         match (Self { function, ..Self::new(experiment.name, source.clone(), generations) }) {
             run if run.points.is_empty() => {
-                Err(Error::WrongState(format!("{source} has no complete generation yet")))
+                let message = format!("{source} has no complete generation yet");
+                Err(Error::WrongState(message).about(experiment_id))
             }
             run => Ok(run),
         }

@@ -13,7 +13,7 @@ use crate::{
     args::{ExperimentArgs, Label},
     change::{Change, SetArg},
     complete,
-    error::Error,
+    error::{Code, Error},
     experiment_file::{ExperimentFile, Overrides, random_request_id},
     interrupt, json,
 };
@@ -139,7 +139,8 @@ fn join(
 ) -> Result<(), Error> {
     let group = group.unwrap_or(&config.name);
     Membership::new(group, variant)
-        .map_err(|problem| Error::Input(format!("{problem}; name it with --group")))?;
+        .map_err(|problem| format!("{problem}; name it with --group"))
+        .map_err(|problem| Error::at(Code::BadArgument, "--group", problem))?;
     let (simulation, config) = (sim_core::FINGERPRINT, config.to_canonical_json());
     let identity = json::line(&[group, simulation, &config]);
     let digest: [u8; 16] = Sha256::digest(identity)[..16].try_into().expect("it has 32");
@@ -175,7 +176,7 @@ fn variants(set: &[String], n_max: usize) -> Result<Vec<Variant>, Error> {
         }
     }
     if !problems.is_empty() {
-        return Err(Error::Input(problems.join("\n")));
+        return Err(Error::at(Code::BadArgument, "--set", problems.join("\n")));
     }
     let mut variants = vec![Variant::default()];
     for axis in &axes {
@@ -190,7 +191,7 @@ fn variants(set: &[String], n_max: usize) -> Result<Vec<Variant>, Error> {
         };
         if variants.len() * axis.len() > n_max {
             let message = format!("these are more than {RUNS_MAX} runs, the maximum of a group");
-            return Err(Error::Input(message));
+            return Err(Error::at(Code::BadArgument, "--set", message));
         }
         variants = variants
             .iter()

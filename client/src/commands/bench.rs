@@ -85,9 +85,8 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
 
 fn experiment(path: Option<&Path>) -> Result<(ExperimentConfig, Simulation), Error> {
     if let Some(path) = path {
-        let compiled = ExperimentFile::read(path)
-            .and_then(|file| file.compile(&Overrides::default()))
-            .map_err(|error| Error::invalid(path, &error))?;
+        let file = ExperimentFile::read(path)?;
+        let compiled = file.compile(&Overrides::default()).map_err(|error| file.invalid(&error))?;
         return Ok((compiled.config, compiled.experiment));
     }
     let (config, _warnings) =

@@ -13,7 +13,7 @@ use statistics::{interquartile_mean, interval};
 use crate::{
     complete,
     connection::Connection,
-    error::Error,
+    error::{Code, Error},
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
     output_file::Overwrite,
     place::Intent,
@@ -89,7 +89,7 @@ pub async fn compare(
     // Refuses a bad name of the figure before reading anything.
     args.to.as_deref().map(|to| Format::check(to, args.overwrite)).transpose()?;
     if args.target.is_some_and(|target| !target.is_finite()) {
-        return Err(Error::Input("--target is a finite number".into()));
+        return Err(Error::option("--target", "is a finite number"));
     }
     let mut samples = Samples::default();
     let (mut files, mut subjects) = (Vec::new(), Vec::new());
@@ -121,11 +121,12 @@ pub async fn compare(
 fn rank(args: &CompareArgs, progress: &mut Progress) -> Result<(), Error> {
     if let Some(other) = args.runs.iter().find(|text| !is_evaluation(text)) {
         let problem = format!("{other} is no directory of an evaluation, as the others are");
-        return Err(Error::Input(problem));
+        return Err(Error::at(Code::BadArgument, other, problem));
     }
     if args.to.is_some() || args.target.is_some() {
+        let option = if args.to.is_some() { "--to" } else { "--target" };
         let problem = "--to and --target compare runs, not evaluations of champions";
-        return Err(Error::Input(problem.into()));
+        return Err(Error::at(Code::BadArgument, option, problem));
     }
     let ranking = Ranking::read(&args.runs)?;
     match progress.is_json() {
@@ -150,9 +151,10 @@ pub async fn of_group(
 fn figure(samples: &[Sample]) -> Result<Figure, Error> {
     let curves: Vec<Curve> = samples.iter().filter_map(curve).collect();
     match curves.len() {
-        0 => Err(Error::Input("there is no history to draw; give .csv files".into())),
+        0 => Err(Error::Input("there is no history to draw; give .csv files".into()).about("--to")),
         n if n > CURVES_MAX => {
-            Err(Error::Input(format!("a figure holds at most {CURVES_MAX} samples")))
+            let message = format!("a figure holds at most {CURVES_MAX} samples");
+            Err(Error::Input(message).about("--to"))
         }
         _ => Ok(Figure {
             title: "mean fitness of the generations".into(),

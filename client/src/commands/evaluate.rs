@@ -146,8 +146,7 @@ async fn subject(
             Ok((file, found.individual.genotype))
         }
         (_, Some(genotype), Some(config)) => {
-            let file =
-                ExperimentFile::read(config).map_err(|error| Error::invalid(config, &error))?;
+            let file = ExperimentFile::read(config)?;
             let genotype = Genotype::read(genotype, &file, args.changed)?;
             Ok((file, genotype.genes))
         }

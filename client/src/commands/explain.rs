@@ -82,7 +82,8 @@ async fn explain(
     experiment_id: u64,
 ) -> Result<(ExplainExperimentResponse, Vec<Finding>), Error> {
     let request = ExplainExperimentRequest { experiment_id };
-    let answer = connection.call(async |client| client.explain_experiment(request).await).await?;
+    let answer = connection.call(async |client| client.explain_experiment(request).await).await;
+    let answer = answer.map_err(|error| error.about(experiment_id))?;
     let experiment = present(answer.experiment.clone())?;
     let mut findings = match connection.data_dir() {
         Some(data_dir) if !has_ended(experiment.state()) => {

@@ -107,9 +107,10 @@ pub async fn export_controller(
 ) -> Result<(), Error> {
     args.overwrite.check_files(&args.to, args.language.names())?;
     if args.language == Language::Onnx && (args.trials > 1 || args.generation.is_some()) {
+        let option = if args.trials > 1 { "--trials" } else { "--generation" };
         let why =
             "a controller in ONNX has no recorded episodes; leave out --trials and --generation";
-        return Err(Error::Input(why.into()));
+        return Err(Error::at(Code::BadArgument, option, why));
     }
     let Subject { file, genotype, generation, .. } = args.subject.find(settings, progress).await?;
     let Compiled { config, experiment: simulation, .. } =

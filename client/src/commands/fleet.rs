@@ -22,7 +22,7 @@ use self::{
 use crate::{
     args::whole,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING},
-    error::Error,
+    error::{Code, Error},
     progress::Progress,
     remote::{Remote, family},
     text,
@@ -106,11 +106,12 @@ impl Remote for FleetArgs {
         let System::Slurm(args) = self.system;
         if args.min > args.max {
             let SlurmArgs { min, max, .. } = args;
-            return Err(Error::Input(format!("--min {min} is more than --max {max}")));
+            return Err(Error::option("--min", format!("{min} is more than --max {max}")));
         }
         if let Some(data_dir) = connection.data_dir() {
             let holder = connection.holder().await;
-            return Err(Error::Input(text::no_fleet(data_dir, holder.as_ref())));
+            let message = text::no_fleet(data_dir, holder.as_ref());
+            return Err(Error::at(Code::BadInput, data_dir.display(), message));
         }
         let connection = connection.with_patience(PATIENCE_WHILE_FOLLOWING);
         let address = connection.address();

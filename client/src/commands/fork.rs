@@ -4,7 +4,7 @@ use clap::Args;
 use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
 use model::Who;
-use swarm_proto::v1::{ForkPoint, GetExperimentRequest};
+use swarm_proto::v1::ForkPoint;
 
 use crate::{
     address::NamedAddress,
@@ -12,7 +12,7 @@ use crate::{
     change::{self, Change, Json, SetArg},
     complete,
     connection::{Connection, present},
-    error::Error,
+    error::{Code, Error},
     experiment_file::{ExperimentFile, Overrides, random_request_id},
     json,
     place::Intent,
@@ -66,15 +66,13 @@ impl Remote for ForkArgs {
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let Who::Generation(generation) = self.address.who else {
-            return Err(Error::Input(format!(
-                "`{}` is no generation; name one, such as {}@9",
-                self.address, self.address.experiment
-            )));
+            let (address, experiment) = (&self.address, &self.address.experiment);
+            let message = format!("`{address}` is no generation; name one, such as {experiment}@9");
+            return Err(Error::at(Code::BadArgument, address, message));
         };
         let experiment_id = connection.one(&self.address.experiment).await?.id;
-        let request = GetExperimentRequest { experiment_id };
-        let parent = connection.call(async |client| client.get_experiment(request).await).await?;
-        let file = self.changed(&parent.config_json)?;
+        let (_, parent) = connection.stored(experiment_id).await?;
+        let file = self.changed(&parent)?;
         let overrides = Overrides {
             seed: self.seed.seed,
             generations: self.generations,
@@ -83,7 +81,10 @@ impl Remote for ForkArgs {
         let mut request = file.request(&overrides, random_request_id("fork"));
         request.priority = self.priority;
         request.fork_of = Some(ForkPoint { experiment_id, generation });
-        let response = connection.submit(request).await.map_err(|error| file.locate(error))?;
+        let response = connection
+            .submit(request)
+            .await
+            .map_err(|error| file.locate(error).about(&self.address))?;
         let experiment = present(response.experiment)?;
         let is_followed = self.watch || connection.computes();
         if !progress.is_json() {
@@ -113,7 +114,7 @@ impl ForkArgs {
         for text in &self.set.set {
             match Change::parse_all(text) {
                 Ok(parsed) => changes.extend(parsed),
-                Err(problem) => problems.push(format!("--set: {problem}")),
+                Err(problem) => problems.push(format!("--set {problem}")),
             }
         }
         if let Some(name) = &self.name {
@@ -121,10 +122,10 @@ impl ForkArgs {
             changes.push(Change::new("name".to_owned(), name));
         }
         if let Err(unplaced) = change::apply_all(&changes, &mut file) {
-            problems.extend(unplaced.into_iter().map(|problem| format!("--set: {problem}")));
+            problems.extend(unplaced.into_iter().map(|problem| format!("--set {problem}")));
         }
         if !problems.is_empty() {
-            return Err(Error::Input(problems.join("\n")));
+            return Err(Error::at(Code::BadArgument, "--set", problems.join("\n")));
         }
         let name = format!("experiment {} with changes", self.address.experiment);
         Ok(ExperimentFile::new(name.into(), json::line(&file)))

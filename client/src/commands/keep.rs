@@ -5,8 +5,8 @@ use clap::Args;
 use clap_complete::ArgValueCompleter;
 use model::wire::has_ended;
 use swarm_proto::v1::{
-    ArchiveExperimentRequest, DeleteExperimentRequest, Experiment, GetExperimentRequest,
-    LabelExperimentRequest, PruneExperimentRequest,
+    ArchiveExperimentRequest, DeleteExperimentRequest, Experiment, LabelExperimentRequest,
+    PruneExperimentRequest,
 };
 
 use super::{
@@ -239,9 +239,8 @@ Examples:
 impl Remote for GetArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let experiment_id = connection.one(&self.target.subject).await?.id;
-        let request = GetExperimentRequest { experiment_id };
-        let response = connection.call(async |client| client.get_experiment(request).await).await?;
-        progress.print_document(&Json::parse(&response.config_json))
+        let (_, config_json) = connection.stored(experiment_id).await?;
+        progress.print_document(&Json::parse(&config_json))
     }
 }
 

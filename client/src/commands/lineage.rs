@@ -10,13 +10,8 @@ use serde::Serialize;
 use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
 
 use crate::{
-    address::NamedAddress,
-    args::whole,
-    complete,
-    connection::Connection,
-    error::{Code, Error},
-    progress::Progress,
-    remote::Remote,
+    address::NamedAddress, args::whole, complete, connection::Connection, error::Error,
+    progress::Progress, remote::Remote,
 };
 
 /// Print the ancestors of an individual of a genetic algorithm, and the genes inherited from
@@ -111,10 +106,7 @@ impl Remote for LineageArgs {
         let address = connection.resolve(&self.address).await?;
         let GetLineageResponse { populations } = connection.lineage(address, self.depth).await?;
         match (self.dot, progress.is_json()) {
-            (true, true) => {
-                let message = "--dot prints no JSON; leave out --output json";
-                Err(Error::at(Code::BadArgument, "--dot", message))
-            }
+            (true, true) => Err(Error::option("--dot", "prints no JSON; leave out --output json")),
             (true, false) => progress.print(&draw::graph(&populations)),
             (false, true) => progress.print_document(&LineageDocument::new(address, &populations)),
             (false, false) => progress.print(&draw::trees(&populations, address.experiment.0)),

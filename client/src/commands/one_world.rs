@@ -323,6 +323,59 @@ async fn every_command_gives_the_same_in_a_directory_as_on_a_coordinator() {
     fleet.stop().await;
 }
 
+/// Commands that are refused, and what their errors for programs are about.
+const REFUSED: &[(&str, &str)] = &[
+    ("watch 9", "9"),
+    ("watch 9 --events", "9"),
+    ("explain 9", "9"),
+    ("history 9", "9"),
+    ("get 9", "9"),
+    ("individual 9", "9"),
+    ("individual 1@99/0", "1@99/0"),
+    ("lineage 9@2/3", "9@2/3"),
+    ("lineage 1@2/3", "1@2/3"),
+    ("label 9 user=ada", "9"),
+    ("pause 9", "9"),
+    ("priority 1 300", "1"),
+    ("cancel 9", "9"),
+    ("resume 9", "9"),
+    ("archive 3", "3"),
+    ("prune 3", "3"),
+    ("delete nobody", "nobody"),
+    ("export 3 --to TO.zip", "3"),
+    ("fork 9@1", "9"),
+    ("fork 1@77", "1@77"),
+    ("fork 1", "1"),
+    ("fork 1@1 --set world", "--set"),
+    ("submit FILE --set seed=1", "--set"),
+    ("simulate 9", "9"),
+    ("replay 1@77/0 --to TO.html", "1@77/0"),
+    ("replay 1 --judged 9999 --to TO.html", "--judged"),
+    ("evaluate 9 --to TO.d", "9"),
+    ("evaluate 1 --perturb a:b --to TO.d", "--perturb"),
+    ("plot 9 --to TO.svg", "9"),
+    ("compare 9", "9"),
+    ("compare 1 --target inf", "--target"),
+    ("fleet slurm --min 5 --max 2", "--min"),
+];
+
+#[tokio::test(flavor = "multi_thread")]
+async fn errors_for_programs_say_what_is_at_fault() {
+    let temporary = tempfile::tempdir().unwrap();
+    let directory = temporary.path();
+    let path = data_dir(directory).await;
+    let (to, file) = (directory.join("to").display().to_string(), quickstart());
+    for (line, place) in REFUSED {
+        let line = line.replace("TO", &to).replace("FILE", file.to_str().unwrap());
+        let words = ["swarmctl", "--data-dir", path.to_str().unwrap()];
+        let args = Args::try_parse_from(words.into_iter().chain(line.split(' '))).unwrap();
+        let progress = Captured::default().progress(args.output);
+        let error =
+            execute(args, progress).await.err().unwrap_or_else(|| panic!("{line} succeeds"));
+        assert_eq!(error.place().as_deref(), Some(*place), "{line}: {error}");
+    }
+}
+
 #[test]
 fn no_command_is_forgotten() {
     let definition = Args::command();

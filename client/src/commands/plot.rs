@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::{
     connection::Connection,
-    error::Error,
+    error::{Code, Error},
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
     place::Intent,
     progress::Progress,
@@ -75,7 +75,8 @@ pub async fn plot(
 fn plot_steps(dir: &Path, args: &PlotArgs, progress: &mut Progress) -> Result<(), Error> {
     let figure = steps::figure(dir, args.metric.as_deref(), &args.conditions)?;
     if figure.curves.len() > CURVES_MAX {
-        return Err(Error::Input(format!("a figure holds at most {CURVES_MAX} conditions")));
+        let message = format!("a figure holds at most {CURVES_MAX} conditions");
+        return Err(Error::at(Code::BadArgument, "--condition", message));
     }
     figure.write(&args.to, args.overwrite)?;
     let conditions: Vec<&str> = figure.curves.iter().map(|curve| curve.name.as_str()).collect();
@@ -140,11 +141,14 @@ fn common_function(runs: &[Run]) -> Result<Option<&str>, Error> {
     let Some((first, function)) = known.next() else { return Ok(None) };
     match known.find(|(_, other)| *other != function) {
         None => Ok(Some(function)),
-        Some((run, other)) => Err(Error::Input(format!(
-            "{} has the fitness function {function}, {} has {other}: their values cannot share an \
-             axis; draw a figure of each",
-            first.source, run.source
-        ))),
+        Some((run, other)) => {
+            let message = format!(
+                "{} has the fitness function {function}, {} has {other}: their values cannot share \
+                 an axis; draw a figure of each",
+                first.source, run.source
+            );
+            Err(Error::Input(message).about(&run.source))
+        }
     }
 }
 

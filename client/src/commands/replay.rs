@@ -92,7 +92,7 @@ pub async fn replay(
     let mut changes = Vec::new();
     for text in &args.set.set {
         let parsed = Change::parse_all(text);
-        changes.extend(parsed.map_err(|problem| Error::Input(format!("--set {problem}")))?);
+        changes.extend(parsed.map_err(|problem| Error::option("--set", problem))?);
     }
     let is_as_evolved =
         changes.is_empty() && args.seed.seed.is_none() && args.steps.steps.is_none();
@@ -118,7 +118,7 @@ pub async fn replay(
             let all = waiting::busy(&what, || {
                 Trials::of_judgement(episode.simulation, episode.genotype, &judged, &|| true)
             });
-            let all = all.map_err(|error| Error::Input(format!("{name}: {error}")))?;
+            let all = all.map_err(|error| Error::Input(format!("{name}: {error}")).about(&name))?;
             let all = all.expect("nothing stops it");
             let (trial, what) = judged_trial(&all, judged.trials, args.judged)?;
             progress.remark(&what);
@@ -127,9 +127,10 @@ pub async fn replay(
             Episode { trial_set: TrialSet::Judgement(judged.generation), trial, ..episode }
         }
         None if args.judged.is_some() => {
-            return Err(Error::Input(format!(
+            let why = format!(
                 "the {name} has not been judged; name a world of its generation with --trial"
-            )));
+            );
+            return Err(Error::at(Code::BadArgument, "--judged", why));
         }
         _ => episode,
     };
@@ -161,7 +162,7 @@ fn judged_trial(trials: &Trials, n: u32, wanted: Option<u32>) -> Result<(u32, St
     if let Some(trial) = wanted {
         if trial >= n {
             let last = n.saturating_sub(1);
-            return Err(Error::Input(format!("--judged {trial}: the trials are 0 to {last}")));
+            return Err(Error::option("--judged", format!("{trial}: the trials are 0 to {last}")));
         }
         return Ok((trial, format!("playing trial {trial} of the {n} that judged the champion")));
     }
@@ -189,7 +190,7 @@ fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> 
             let message = format!("{}: {error}", episode.name);
             Error::at(Code::BadGenotype, episode.name, message)
         }
-        error => Error::Input(error.to_string()),
+        error => Error::Input(error.to_string()).about(episode.name),
     })?;
     Ok(replay_file(&match trials {
         Some(trials) => replay.of_trials(trials),
@@ -199,8 +200,9 @@ fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> 
 
 /// The room of an episode in a world with bodies.
 fn room(episode: &Episode<'_>) -> Result<Option<RoomRecord>, Error> {
-    let Episode { simulation, trial_set, trial, .. } = *episode;
-    simulation.room(trial_set, trial).map_err(|error| Error::Input(error.to_string()))
+    let Episode { simulation, trial_set, trial, name, .. } = *episode;
+    let room = simulation.room(trial_set, trial);
+    room.map_err(|error| Error::Input(error.to_string()).about(name))
 }
 
 /// All steps of an episode.
@@ -209,7 +211,7 @@ fn steps(episode: &Episode<'_>) -> Result<Vec<StepRecord>, Error> {
     let Episode { simulation, genotype, trial_set, trial, name, .. } = *episode;
     simulation
         .simulate(genotype, trial_set, trial, &mut |step| steps.push(step.clone()))
-        .map_err(|error| Error::Input(format!("{name}: {error}")))?;
+        .map_err(|error| Error::Input(format!("{name}: {error}")).about(name))?;
     Ok(steps)
 }
 
@@ -236,8 +238,7 @@ impl ReplayArgs {
         if format == Format::Html
             && let Some(option) = self.picture.given()
         {
-            let why = format!("{option} is for .png and .svg; a .html has all steps");
-            return Err(Error::Input(why));
+            return Err(Error::option(option, "is for .png and .svg; a .html has all steps"));
         }
         Ok((path, format))
     }

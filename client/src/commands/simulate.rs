@@ -61,7 +61,8 @@ pub async fn simulate(
                 };
                 let simulated =
                     compiled.experiment.simulate(&genotype.genes, generation, trial, observe);
-                let summary = simulated.map_err(|error| Error::Input(error.to_string()))?;
+                let summary = simulated
+                    .map_err(|error| Error::Input(error.to_string()).about(genotype.place()))?;
                 trials.push(Trial { trial, summary });
             }
             Ok::<_, Error>(trials)

@@ -52,8 +52,7 @@ impl SubjectArgs {
     /// Reads the files, or asks for the genotype at the address.
     pub async fn find(&self, settings: Settings, progress: &Progress) -> Result<Subject, Error> {
         if let (Some(config), Some(genotype)) = (&self.config, &self.genotype) {
-            let file = ExperimentFile::read(config);
-            let file = file.map_err(|error| Error::invalid(config, &error))?;
+            let file = ExperimentFile::read(config)?;
             let genotype = Genotype::read(genotype, &file, self.changed)?;
             return Ok(Subject { file, genotype, generation: 0, judged: None });
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use experiment_file::{ConfigError, Problem, Seed};
+use experiment_file::{Problem, Seed};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -33,7 +33,7 @@ pub fn validate(args: &ValidateArgs, progress: &mut Progress) -> Result<(), Erro
     let ValidateArgs { files, strict } = args;
     let mut reports = Vec::new();
     for file in files {
-        let report = Report::of_file(file);
+        let report = Report::of_file(file)?;
         for problem in &report.problems {
             progress.remark(&format!("{}: {problem}", report.file));
         }
@@ -53,10 +53,14 @@ pub fn validate(args: &ValidateArgs, progress: &mut Progress) -> Result<(), Erro
     match (n_bad, n_doubtful) {
         (0, 0) => Ok(()),
         (0, _) if !strict => Ok(()),
-        (0, n) => Err(Error::Input(format!(
-            "experiment files with warnings: {n} of {}, and --strict allows none",
-            files.len()
-        ))),
+        (0, n) => {
+            let mut doubtful = reports.iter().filter(|report| !report.warnings.is_empty());
+            let first = doubtful.next().map_or("", |report| &report.file);
+            let n_all = files.len();
+            let message =
+                format!("experiment files with warnings: {n} of {n_all}, and --strict allows none");
+            Err(Error::at(Code::BadInput, first, message))
+        }
         (n, _) => {
             let bad = reports.iter().find(|report| !report.ok).map_or("", |report| &report.file);
             let message = format!("experiment files with problems: {n} of {}", files.len());
@@ -120,16 +124,20 @@ struct Located<'a> {
 }
 
 impl Report {
-    fn of_file(path: &Path) -> Self {
+    fn of_file(path: &Path) -> Result<Self, Error> {
+        let checked = ExperimentFile::read(path).and_then(|file| {
+            file.check(&Overrides::default()).map_err(|error| file.invalid(&error))
+        });
         let file = path.to_string_lossy().into_owned();
-        match ExperimentFile::read(path).and_then(|file| file.check(&Overrides::default())) {
+        match checked {
             Ok(compiled) => {
                 let summary = Some(Summary::from_compiled(&compiled));
-                Self { file, ok: true, problems: vec![], warnings: compiled.warnings, summary }
+                Ok(Self { file, ok: true, problems: vec![], warnings: compiled.warnings, summary })
             }
-            Err(ConfigError { problems }) => {
-                Self { file, ok: false, problems, warnings: vec![], summary: None }
+            Err(Error::Config { problems, .. }) => {
+                Ok(Self { file, ok: false, problems, warnings: vec![], summary: None })
             }
+            Err(error) => Err(error),
         }
     }
 }

@@ -343,7 +343,10 @@ pub async fn deserted(connection: &Connection, experiments: &[Experiment]) -> Er
         for experiment in experiments {
             match connection.experiment(experiment.id).await {
                 Ok(experiment) if has_ended(experiment.state()) => {}
-                Ok(experiment) => return Error::WrongState(text::deserted(&experiment, data_dir)),
+                Ok(experiment) => {
+                    let message = text::deserted(&experiment, data_dir);
+                    return Error::WrongState(message).about(experiment.id);
+                }
                 Err(error) => return error,
             }
         }

@@ -40,6 +40,9 @@ Examples:
   swarmctl web
   swarmctl web --data-dir backups/today";
 
+/// The option with the address.
+const OPTION: &str = "--web-listen";
+
 /// Pages that are served until an interrupt, for programs.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Served {
@@ -56,15 +59,15 @@ pub async fn web(
 ) -> Result<(), Error> {
     let listen = args.web_listen;
     if !listen.ip().to_canonical().is_loopback() {
-        return Err(Error::Input(format!(
-            "--web-listen {listen}: these pages are for this machine only; use `ssh -L`, or \
-             `coordinator --web-listen`, which has tokens and TLS"
-        )));
+        let what = format!(
+            "{listen}: these pages are for this machine only; use `ssh -L`, or `coordinator \
+             --web-listen`, which has tokens and TLS"
+        );
+        return Err(Error::option(OPTION, what));
     }
     let reader =
         Reader::open_alone(&data_dir(settings)).map_err(|error| Error::from_store(&error))?;
-    let cannot =
-        |error| Error::Input(format!("--web-listen {listen}: cannot listen there: {error}"));
+    let cannot = |error| Error::option(OPTION, format!("{listen}: cannot listen there: {error}"));
     let listener = TcpListener::bind(listen).await.map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
     let token = random_token();

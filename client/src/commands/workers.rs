@@ -116,7 +116,8 @@ impl Remote for WorkersArgs {
             let request = ReadmitWorkerRequest { name };
             connection
                 .call_fleet(async |client| client.readmit_worker(request.clone()).await)
-                .await?;
+                .await
+                .map_err(|error| error.about("--readmit"))?;
         }
         let request = ListWorkersRequest {};
         let response =

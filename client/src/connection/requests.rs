@@ -3,8 +3,8 @@
 use swarm_proto::v1::{
     CompletedGeneration, EvaluateFitnessRequest, EvaluateRequest, EvaluateResponse, Event,
     Experiment, ExportExperimentRequest, GenerationDynamics, GetChampionRequest,
-    GetChampionResponse, GetExperimentRequest, ImportExperimentRequest, ListDynamicsRequest,
-    ListEventsRequest, ListGenerationsRequest, SubmitExperimentRequest, SubmitExperimentResponse,
+    GetChampionResponse, ImportExperimentRequest, ListDynamicsRequest, ListEventsRequest,
+    ListGenerationsRequest, SubmitExperimentRequest, SubmitExperimentResponse,
     WatchExperimentRequest, WatchExperimentResponse, WatchExplanationRequest,
     WatchExplanationResponse, WatchNewsRequest, WatchNewsResponse,
 };
@@ -30,9 +30,7 @@ impl Connection {
 
     /// One experiment.
     pub async fn experiment(&self, experiment_id: u64) -> Result<Experiment, Error> {
-        let request = GetExperimentRequest { experiment_id };
-        let response = self.call(async |client| client.get_experiment(request).await).await?;
-        present(response.experiment)
+        Ok(self.stored(experiment_id).await?.0)
     }
 
     /// The measures of a genotype, as a stream; not repeated.
@@ -55,7 +53,8 @@ impl Connection {
         let mut next_generation = Some(0);
         while let Some(from_generation) = next_generation {
             let request = ListGenerationsRequest { experiment_id, from_generation, page_size: 0 };
-            let page = self.call(async |client| client.list_generations(request).await).await?;
+            let page = self.call(async |client| client.list_generations(request).await).await;
+            let page = page.map_err(|error| error.about(experiment_id))?;
             generations.extend(page.generations);
             next_generation = page.next_generation;
         }
@@ -69,7 +68,8 @@ impl Connection {
         let mut next = Some(0);
         while let Some(from_generation) = next {
             let request = ListDynamicsRequest { experiment_id, from_generation };
-            let page = self.call(async |client| client.list_dynamics(request).await).await?;
+            let page = self.call(async |client| client.list_dynamics(request).await).await;
+            let page = page.map_err(|error| error.about(experiment_id))?;
             generations.extend(page.generations);
             next = page.next_generation;
         }
@@ -84,7 +84,8 @@ impl Connection {
     ) -> Result<Vec<Event>, Error> {
         let page_size = EVENT_PAGE_LEN;
         let request = ListEventsRequest { experiment_id, from_sequence, page_size };
-        let page = self.call(async |client| client.list_events(request).await).await?;
+        let page = self.call(async |client| client.list_events(request).await).await;
+        let page = page.map_err(|error| error.about(experiment_id))?;
         Ok(page.events)
     }
 
@@ -126,7 +127,7 @@ impl Connection {
         };
         match waiting::aloud(async || Some(self.waits(None)), bundle).await {
             Ok(bytes) => Ok(bytes),
-            Err(status) => Err(self.diagnose(self.error(&status)).await),
+            Err(status) => Err(self.diagnose(self.error(&status)).await.about(experiment_id)),
         }
     }
 

@@ -18,8 +18,9 @@ pub struct Answer {
 #[derive(Debug, Serialize, JsonSchema)]
 struct Failure {
     code: Code,
-    /// A file, with `:LINE` if the line is known; an option; the name of an experiment; or an
-    /// address. Null if the command as a whole is concerned.
+    /// A file, with `:LINE` if the line is known; an option; the number, name or address of an
+    /// experiment or a genotype; or an address of the network. Null if the command as a whole is
+    /// concerned.
     r#where: Option<String>,
     /// What people read.
     message: String,
@@ -58,10 +59,9 @@ impl From<&Error> for Answer {
 }
 
 fn mistakes(error: &Error) -> Vec<Mistake> {
-    let Error::Config { file, problems } = error else { return Vec::new() };
-    if error.code() != Code::InvalidExperiment {
+    let Error::Config { code: Code::InvalidExperiment, file, problems } = error else {
         return Vec::new();
-    }
+    };
     let mistake = |problem: &experiment_file::Problem| Mistake {
         r#where: line_of(file, problem.line),
         key: Some(problem.path.clone()).filter(|path| !path.is_empty()),
@@ -158,7 +158,8 @@ mod tests {
         };
         let problems =
             vec![problem(Some(3), "world.width", "must be 1 or more"), problem(None, "", "empty")];
-        let error = Error::Config { file: "a.json".into(), problems };
+        let code = Code::InvalidExperiment;
+        let error = Error::Config { code, file: "a.json".into(), problems };
         let answer = serde_json::to_value(Answer::from(&error)).unwrap();
         assert_eq!(answer["error"]["code"], "invalid_experiment");
         assert_eq!(answer["error"]["where"], "a.json");
@@ -172,11 +173,21 @@ mod tests {
     }
 
     #[test]
-    fn an_option_at_the_beginning_of_a_message_is_its_place() {
-        let place = |message: &str| Error::Input(message.into()).place();
-        assert_eq!(place("--judged 300: the trials are 0 to 199").as_deref(), Some("--judged"));
-        assert_eq!(place("--base: no such key").as_deref(), Some("--base"));
-        assert_eq!(place("a figure holds at most 8 runs"), None);
+    fn a_refusal_keeps_its_code_and_gets_a_place_once() {
+        let place_and_code = |error: &Error| (error.place(), error.code());
+        for (error, code) in [
+            (Error::NotFound("no experiment 9".into()), Code::NotFound),
+            (Error::WrongState("it has ended".into()), Code::WrongState),
+            (Error::Input("no such label".into()), Code::BadInput),
+        ] {
+            let message = error.to_string();
+            let error = error.about(9).about("another");
+            assert_eq!(place_and_code(&error), (Some("9".into()), code));
+            assert_eq!(error.to_string(), message);
+        }
+        let error = Error::option("--judged", "300: the trials are 0 to 199");
+        assert_eq!(place_and_code(&error), (Some("--judged".into()), Code::BadArgument));
+        assert_eq!(error.to_string(), "--judged 300: the trials are 0 to 199");
     }
 
     #[test]

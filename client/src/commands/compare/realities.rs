@@ -109,9 +109,8 @@ impl Ranking {
     /// Reads evaluations of one task in the same trials and realities.
     pub fn read(directories: &[String]) -> Result<Self, Error> {
         if directories.len() < 2 {
-            return Err(Error::Input(
-                "there is nothing to compare; name two evaluations or more".into(),
-            ));
+            let problem = "there is nothing to compare; name two evaluations or more".to_owned();
+            return Err(Error::Input(problem).about(directories.join(", ")));
         }
         let read = directories.iter().map(|name| read_evaluation(name).map(|read| (name, read)));
         let evaluations = read.collect::<Result<Vec<_>, Error>>()?;
@@ -119,7 +118,7 @@ impl Ranking {
         for (name, (evaluation, realities)) in &evaluations[1..] {
             if let Some(reason) = difference((first, first_realities), (evaluation, realities)) {
                 let problem = format!("{first_name} and {name} cannot be compared: {reason}");
-                return Err(Error::Input(problem));
+                return Err(Error::Input(problem).about(name));
             }
         }
         let column = |value: fn(&Robustness) -> f64| -> Vec<f64> {

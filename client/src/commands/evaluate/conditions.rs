@@ -89,8 +89,9 @@ pub fn all(
         base_changes.extend(parsed("--base", text)?);
     }
     apply_all(&base_changes, &mut base)
-        .map_err(|problems| Error::Input(format!("--base {}", problems.join("; "))))?;
-    let mut config = read("--base", &base)?;
+        .map_err(|problems| Error::option("--base", problems.join("; ")))?;
+    let of_base = |problem| Error::option("--base", problem);
+    let mut config = read(&base).map_err(of_base)?;
     let realities = args.pseudo_realities.map(|n| Realities::draw(&config, n)).transpose()?;
     if realities.is_some() {
         let robots = config.algorithm.evolvable_object.clone();
@@ -98,7 +99,7 @@ pub fn all(
         if base.get_mut(path).is_some_and(|perturbations| perturbations.remove("pseudo_reality")) {
             let path = format!("{}.pseudo_reality", path.join("."));
             base_changes.push(Change::new(path, Json::Scalar(serde_json::Value::Null)));
-            config = read("--base", &base)?;
+            config = read(&base).map_err(of_base)?;
         }
     }
     let nominal = Nominal { config, base };
@@ -124,11 +125,12 @@ pub fn all(
     if conditions.len() > CONDITIONS_MAX {
         let n = conditions.len();
         let problem = format!("at most {CONDITIONS_MAX} conditions at once; these are {n}");
-        return Err(Error::Input(problem));
+        return Err(Error::at(Code::BadArgument, "--set", problem));
     }
     for (index, condition) in conditions.iter().enumerate() {
         if conditions[..index].iter().any(|other| other.name == condition.name) {
-            return Err(Error::Input(format!("condition {} is given twice", condition.name)));
+            let (name, code) = (&condition.name, Code::BadArgument);
+            return Err(Error::at(code, name, format!("condition {name} is given twice")));
         }
     }
     Ok((conditions, realities))
@@ -147,17 +149,18 @@ impl Nominal {
         };
         let mut file = self.base.clone();
         apply_all(&changes, &mut file).map_err(|problems| input(problems.join("; ")))?;
-        let config = read(&format!("condition {name}"), &file)?;
+        let config = read(&file).map_err(input)?;
         let experiment = Simulation::compile(&config).map_err(|error| input(problems(&error)))?;
         Ok(Condition { name, role: Role::Other, changes, config, experiment })
     }
 
     /// The conditions of one `--set`: one for each combination of its values.
     fn conditions(&self, text: &str) -> Result<Vec<Condition>, Error> {
-        let combinations = Change::parse_combinations(text)
-            .map_err(|problem| Error::Input(format!("--set {problem}")))?;
+        let combinations =
+            Change::parse_combinations(text).map_err(|problem| Error::option("--set", problem))?;
         if combinations.len() > CONDITIONS_MAX {
-            return Err(Error::Input(format!("at most {CONDITIONS_MAX} conditions at once")));
+            let problem = format!("at most {CONDITIONS_MAX} conditions at once");
+            return Err(Error::at(Code::BadArgument, "--set", problem));
         }
         let is_one = combinations.len() == 1;
         let condition = |changes: Vec<Change>| {
@@ -214,7 +217,7 @@ impl Nominal {
         let params = match Json::parse(params) {
             Json::Object(params) => params,
             _ => parameters(params)
-                .map_err(|problem| Error::Input(format!("--perturb {text}: {problem}")))?,
+                .map_err(|problem| Error::option("--perturb", format!("{text}: {problem}")))?,
         };
         let path = self.place(&format!("perturbations.{name}"));
         Ok(vec![Change::new(path, Json::Object(params))])
@@ -238,7 +241,8 @@ impl Nominal {
                 let short = sensors.iter().filter_map(|(_, sensor)| sensor.split(':').nth(1));
                 let known: Vec<&str> = known.chain(short).collect();
                 let suggestion = suggestion(name, &known);
-                Error::Input(format!("--inhibit {name}: no stimulus has this name; {suggestion}"))
+                let what = format!("{name}: no stimulus has this name; {suggestion}");
+                Error::option("--inhibit", what)
             })?;
         let parameters = [("stimuli", sensor), ("affected_robots", "all")];
         let parameters =
@@ -258,7 +262,7 @@ impl Nominal {
 }
 
 fn parsed(option: &str, text: &str) -> Result<Vec<Change>, Error> {
-    Change::parse_all(text).map_err(|problem| Error::Input(format!("{option} {problem}")))
+    Change::parse_all(text).map_err(|problem| Error::option(option, problem))
 }
 
 /// Reads `KEY=VALUE,...`; commas within a value do not separate.
@@ -276,10 +280,10 @@ fn to_json(config: &ExperimentConfig) -> Json {
     Json::parse(&config.to_canonical_json())
 }
 
-fn read(owner: &str, file: &Json) -> Result<ExperimentConfig, Error> {
+fn read(file: &Json) -> Result<ExperimentConfig, String> {
     match ExperimentConfig::from_json(&json::line(file), "", evolution::ALGORITHMS) {
         Ok((config, _)) => Ok(config),
-        Err(error) => Err(Error::Input(format!("{owner}: {}", problems(&error)))),
+        Err(error) => Err(problems(&error)),
     }
 }
 

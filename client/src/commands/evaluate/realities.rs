@@ -95,9 +95,8 @@ impl Realities {
                 Some(_) => "the file's pseudo_reality states no range or number that matters to",
                 None => "no key of pseudo_reality matters to",
             };
-            return Err(Error::Input(format!(
-                "--pseudo-realities: {problem} robots of `{evolvable}`"
-            )));
+            let what = format!("{n}: {problem} robots of `{evolvable}`");
+            return Err(Error::option("--pseudo-realities", what));
         }
         let of = |values: &IndexMap<String, Json>| -> IndexMap<&'static str, Json> {
             keys.iter().map(|key| (*key, values[*key].clone())).collect()

@@ -87,11 +87,12 @@ async fn call(
         Error::Input(format!(
             "cannot run {program}: {error}; this command needs a machine that has Slurm"
         ))
+        .about(program)
     })?;
     let Output { status, stdout, stderr } = output;
     if !status.success() {
         let reason = String::from_utf8_lossy(&stderr).trim().replace('\n', "; ");
-        return Err(Error::Input(format!("{program}: {reason}")));
+        return Err(Error::Input(format!("{program}: {reason}")).about(program));
     }
     Ok(String::from_utf8_lossy(&stdout).into_owned())
 }

@@ -17,7 +17,10 @@ use self::{
     camera::Camera,
     draw::Fixed,
 };
-use crate::{args::whole, error::Error};
+use crate::{
+    args::whole,
+    error::{Code, Error},
+};
 
 /// Side of a picture and of an animation, pixels. 100 frames of an animation should stay below
 /// 1 MB.
@@ -113,7 +116,8 @@ impl<'a> Shown<'a> {
         let end = n_steps.saturating_sub(1) as u32;
         let Moments { first, last } = moments.unwrap_or(Moments { first: end, last: end });
         if last as usize >= n_steps {
-            return Err(Error::Input(format!("--at {last}: the episode has steps 0 to {end}")));
+            let what = format!("{last}: the episode has steps 0 to {end}");
+            return Err(Error::option("--at", what));
         }
         Ok(Self { config, room, steps, range: first as usize..=last as usize })
     }
@@ -141,7 +145,8 @@ pub fn svg(
 ) -> Result<Vec<u8>, Error> {
     let shown = Shown::new(config, room, steps, args.at)?;
     if shown.n_frames() > 1 {
-        return Err(Error::Input("an .svg shows one step; a .png may be animated".into()));
+        let message = "an .svg shows one step; a .png may be animated";
+        return Err(Error::at(Code::BadArgument, "--at", message));
     }
     let side = args.side(1);
     let fine = side * FINE;
@@ -167,7 +172,8 @@ pub fn png(
     let shown = Shown::new(config, room, steps, args.at)?;
     let n_frames = shown.n_frames();
     if n_frames > FRAMES_MAX {
-        return Err(Error::Input(format!("an animation has at most {FRAMES_MAX} steps")));
+        let message = format!("an animation has at most {FRAMES_MAX} steps");
+        return Err(Error::at(Code::BadArgument, "--at", message));
     }
     let side = args.side(n_frames);
     let times = if n_frames > 1 { FINE_OF_ANIMATIONS } else { FINE };

@@ -108,7 +108,7 @@ impl SimulateArgs {
 
     /// Reads the experiment file.
     pub fn file(&self) -> Result<ExperimentFile, Error> {
-        ExperimentFile::read(&self.subject).map_err(|error| Error::invalid(&self.subject, &error))
+        ExperimentFile::read(&self.subject)
     }
 
     /// Compiles an experiment file, with the replacements.

@@ -91,7 +91,10 @@ fn deserted(
 ) -> Result<(), Error> {
     let unfinished = experiments.iter().find(|experiment| !has_ended(experiment.state()));
     match unfinished.filter(|_| is_of_some) {
-        Some(unfinished) => Err(Error::WrongState(text::deserted(unfinished, data_dir))),
+        Some(unfinished) => {
+            let message = text::deserted(unfinished, data_dir);
+            Err(Error::WrongState(message).about(unfinished.id))
+        }
         None => {
             progress.remark(&text::no_fleet(data_dir, None));
             Ok(())
