@@ -246,6 +246,25 @@ impl Machine<'_> {
         exprs.iter().map(|expr| self.eval(expr)).collect()
     }
 
+    /// Hands the values of expressions to a function. Up to two of them need no allocation.
+    fn with_all<T>(
+        &mut self,
+        exprs: &[Expr],
+        take: impl FnOnce(&mut Self, &[Value]) -> Outcome<T>,
+    ) -> Outcome<T> {
+        match exprs {
+            [a] => {
+                let values = [self.eval(a)?];
+                take(self, &values)
+            }
+            [a, b] => {
+                let values = [self.eval(a)?, self.eval(b)?];
+                take(self, &values)
+            }
+            _ => self.all(exprs).and_then(|values| take(self, &values)),
+        }
+    }
+
     fn eval(&mut self, expr: &Expr) -> Outcome<Value> {
         self.operation(&expr.op).map_err(|fault| fault.at(expr.line))
     }
@@ -317,33 +336,30 @@ impl Machine<'_> {
                 builtins::slice(&value, &from, &to, meter)?
             }
             Op::Call(function, arguments) => {
-                let values = self.all(arguments)?;
                 let program = self.program;
-                self.call(&program.functions[*function], &values)?
+                return self.with_all(arguments, |machine, values| {
+                    machine.call(&program.functions[*function], values)
+                });
             }
-            Op::Builtin(function, arguments) => match arguments.as_slice() {
-                [argument] => {
-                    let value = self.eval(argument)?;
-                    builtins::builtin(*function, &[value], meter)?
-                }
-                _ => builtins::builtin(*function, &self.all(arguments)?, meter)?,
-            },
+            Op::Builtin(function, arguments) => {
+                return self
+                    .with_all(arguments, |_, values| builtins::builtin(*function, values, meter));
+            }
             Op::Order(order) => self.order(order)?,
             Op::Method(thing, called, arguments) => {
                 let thing = self.eval(thing)?;
-                let values = self.all(arguments)?;
-                match (&thing, called.host, called.container) {
-                    (Value::Object(object), Some(name), _) => {
-                        self.begin()?;
-                        self.host.call(*object, name, &values, meter)?
+                return self.with_all(arguments, |machine, values| {
+                    match (&thing, called.host, called.container) {
+                        (Value::Object(object), Some(name), _) => {
+                            machine.begin()?;
+                            Ok(machine.host.call(*object, name, values, meter)?)
+                        }
+                        (_, _, Some(method)) => builtins::method(&thing, method, values, meter),
+                        _ => {
+                            Err(format!("{} has no such method", thing.kind_with_article()).into())
+                        }
                     }
-                    (_, _, Some(method)) => builtins::method(&thing, method, &values, meter)?,
-                    _ => {
-                        return Err(
-                            format!("{} has no such method", thing.kind_with_article()).into()
-                        );
-                    }
-                }
+                });
             }
             Op::Nothing => Value::Nothing,
             Op::Bool(value) => Value::Bool(*value),
