@@ -1,9 +1,11 @@
 //! Simulates all trials of one genotype step by step and side by side, so that their networks
 //! share one pass over the weights.
 
+mod described;
 mod recorder;
 mod witness;
 
+pub(crate) use described::Described;
 pub(crate) use recorder::{AllMeasures, FitnessOnly, Recorder, Viewer};
 pub(crate) use witness::testify;
 

@@ -78,6 +78,7 @@ mod bodies;
 mod border;
 mod communication;
 mod controllers;
+mod descriptors;
 mod drive;
 mod episode;
 mod exp2;

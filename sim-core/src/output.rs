@@ -9,4 +9,7 @@ pub enum Output {
     /// The fitness of a trial, and then step by step every measure of the task. See
     /// [`Simulation::measure_while`](crate::Simulation::measure_while).
     Measures,
+    /// The fitness of a trial, and then its descriptors. See
+    /// [`Simulation::describe_while`](crate::Simulation::describe_while).
+    Descriptors,
 }

@@ -3,7 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::episode::{self, AllMeasures, FitnessOnly, Viewer};
+use crate::descriptors::{self, Descriptor};
+use crate::episode::{self, AllMeasures, Described, FitnessOnly, Viewer};
 use crate::fitness::{self, Definition};
 use crate::genotype::Codec;
 use crate::network::{Network, Phenotype};
@@ -33,6 +34,7 @@ pub struct Simulation {
     pub(crate) fitness_params: FitnessParams,
     pub(crate) script: Option<Arc<ScriptTask>>,
     measure_names: Vec<MeasureName>,
+    pub(crate) descriptors: Vec<Descriptor>,
     pub(crate) network: Network,
     codec: Codec,
     pub(crate) world: World,
@@ -120,8 +122,12 @@ impl Simulation {
         if let (Some(task), Some(script), Some(world)) = (&config.task, &script, &world) {
             script.check(&task.script.name, world, &mut problems);
         }
-        problems.check()?;
         let measure_names = measure_names(fitness, script.as_ref());
+        // The measures of a script that does not compile are unknown.
+        let is_known = config.task.is_none() || script.is_some();
+        let wanted = if is_known { &algorithm.descriptors[..] } else { &[] };
+        let descriptors = descriptors::compile(wanted, &measure_names, &mut problems);
+        problems.check()?;
         let simulation = Self {
             isa: Isa::best(),
             seed: config.seed,
@@ -131,6 +137,7 @@ impl Simulation {
             fitness_params: algorithm.fitness_params,
             script: script.map(Arc::new),
             measure_names,
+            descriptors,
             network,
             codec,
             world: world.expect("a world without problems compiles"),
@@ -247,6 +254,33 @@ impl Simulation {
         let phenotype = self.phenotype(genotype)?;
         self.check_trials(&trials)?;
         let mut recorder = AllMeasures::new(self, trials.len());
+        let done =
+            episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
+        Ok(done.then_some(recorder.values))
+    }
+
+    /// Number of descriptors of a trial.
+    pub fn n_descriptors(&self) -> usize {
+        self.descriptors.len()
+    }
+
+    /// As [`evaluate_while`](Self::evaluate_while), but also describes the behaviour. Returns for
+    /// each trial its fitness, bit for bit, and then the value of every descriptor of the file, in
+    /// their order; NaN if the trial has no such value.
+    ///
+    /// # Errors
+    ///
+    /// As [`evaluate`](Self::evaluate).
+    pub fn describe_while(
+        &self,
+        genotype: &[f64],
+        trial_set: impl Into<TrialSet>,
+        trials: Range<u32>,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<f64>>, EvaluateError> {
+        let phenotype = self.phenotype(genotype)?;
+        self.check_trials(&trials)?;
+        let mut recorder = Described::new(self, trials.len());
         let done =
             episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
         Ok(done.then_some(recorder.values))

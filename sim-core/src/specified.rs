@@ -46,8 +46,9 @@ impl SpecifiedSimulation {
         self.robot_steps
     }
 
-    /// Computes the trials of one genotype with [`Simulation::evaluate_while`] or
-    /// [`Simulation::measure_while`], depending on `output`. `None` if `keep_going` stopped it.
+    /// Computes the trials of one genotype with [`Simulation::evaluate_while`],
+    /// [`Simulation::measure_while`] or [`Simulation::describe_while`], depending on `output`. `None`
+    /// if `keep_going` stopped it.
     ///
     /// # Errors
     ///
@@ -64,6 +65,9 @@ impl SpecifiedSimulation {
         let computed = match output {
             Output::Fitness => simulation.evaluate_while(genotype, trial_set, trials, keep_going),
             Output::Measures => simulation.measure_while(genotype, trial_set, trials, keep_going),
+            Output::Descriptors => {
+                simulation.describe_while(genotype, trial_set, trials, keep_going)
+            }
         };
         computed.map_err(|error| error.to_string())
     }

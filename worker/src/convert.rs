@@ -102,6 +102,9 @@ pub(crate) fn result(result: ItemResult) -> v1::ItemResult {
                 Output::Measures => {
                     v1::item_result::Outcome::Measures(v1::TrialMeasures { values })
                 }
+                Output::Descriptors => {
+                    v1::item_result::Outcome::Descriptors(v1::TrialDescriptors { values })
+                }
             }),
             compute_us,
         },
@@ -116,6 +119,7 @@ pub(crate) fn next_message(ready: &mut Vec<v1::ItemResult>) -> v1::WorkRequest {
         n_values += match &result.outcome {
             Some(v1::item_result::Outcome::Measures(measures)) => measures.values.len(),
             Some(v1::item_result::Outcome::Fitness(fitness)) => fitness.values.len(),
+            Some(v1::item_result::Outcome::Descriptors(described)) => described.values.len(),
             _ => 0,
         };
         n_values <= VALUES_PER_MESSAGE_MAX

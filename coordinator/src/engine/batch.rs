@@ -32,7 +32,7 @@ const WITHOUT_FITNESS_MIN: u32 = 8;
 /// Trials per item: all of them, unless their numbers exceed [`VALUES_PER_ITEM`].
 fn trials_per_item(batch: &Batch) -> u32 {
     let n_trials = match batch.output {
-        Output::Fitness => batch.n_trials,
+        Output::Fitness | Output::Descriptors => batch.n_trials,
         Output::Measures => {
             u32::try_from(VALUES_PER_ITEM / batch.values_per_trial.max(1)).unwrap_or(u32::MAX)
         }
@@ -352,10 +352,22 @@ impl BatchInProgress {
         let n_individuals = self.request.genotypes.len() as u32;
         let individual = self.n_without_fitness;
         let is_open = is_generation
-            && self.request.output == Output::Fitness
+            && self.request.output != Output::Measures
             && individual < n_individuals.min(WITHOUT_FITNESS_MIN)
-            && !evolution::has_finite_fitness(self.known.values());
+            && !self.has_finite_fitness();
         is_open.then_some(Item { individual, trials: 0..self.request.n_trials })
+    }
+
+    /// Whether an individual has a finite mean fitness, which is the first number of each trial.
+    fn has_finite_fitness(&self) -> bool {
+        let values = self.known.values();
+        match self.request.values_per_trial {
+            1 => evolution::has_finite_fitness(values),
+            n => values.iter().any(|values| {
+                let fitness: Vec<f64> = values.iter().copied().step_by(n).collect();
+                evolution::has_finite_fitness(&[fitness])
+            }),
+        }
     }
 
     /// The outcome.

@@ -43,6 +43,20 @@ impl Batch {
         }
     }
 
+    /// The fitness of genotypes and, if there are any, this number of descriptors per trial.
+    pub fn described(
+        trial_set: TrialSet,
+        genotypes: Population,
+        n_trials: u32,
+        n_descriptors: usize,
+    ) -> Self {
+        let fitness = Self::fitness(trial_set, genotypes, n_trials);
+        match n_descriptors {
+            0 => fitness,
+            n => Self { output: Output::Descriptors, values_per_trial: 1 + n, ..fitness },
+        }
+    }
+
     /// The measures of one genotype on trials of evaluations, `values_per_trial`
     /// numbers each.
     pub fn measures(genotype: Genotype, n_trials: u32, values_per_trial: usize) -> Self {

@@ -75,9 +75,15 @@ impl Engine {
         {
             return Some(format!("it returned {} values for {n_trials} trials", values.len()));
         }
-        (batch.request.output != result.output).then(|| match result.output {
-            Output::Fitness => "it returned fitness where measures are due".to_owned(),
-            Output::Measures => "it returned measures where fitness is due".to_owned(),
+        (batch.request.output != result.output).then(|| {
+            let [returned, due] =
+                [result.output, batch.request.output].map(|output| match output {
+                    Output::Fitness => "fitness",
+                    Output::Measures => "measures",
+                    Output::Descriptors => "descriptors",
+                });
+            let verb = if due == "fitness" { "is" } else { "are" };
+            format!("it returned {returned} where {due} {verb} due")
         })
     }
 

@@ -132,6 +132,9 @@ fn compute(
         let outcome = match (computed.transpose()?, output) {
             (Ok(values), Output::Fitness) => Outcome::Fitness(v1::TrialFitness { values }),
             (Ok(values), Output::Measures) => Outcome::Measures(v1::TrialMeasures { values }),
+            (Ok(values), Output::Descriptors) => {
+                Outcome::Descriptors(v1::TrialDescriptors { values })
+            }
             (Err(message), _) => Outcome::Failure(v1::ItemFailure { message }),
         };
         Some(v1::ItemResult { assignment_id, outcome: Some(outcome), compute_us: 0 })

@@ -148,6 +148,7 @@ impl Process {
         let verdict = match result.and_then(|result| result.outcome) {
             Some(Outcome::Fitness(v1::TrialFitness { values })) => Verdict::Values(values),
             Some(Outcome::Measures(v1::TrialMeasures { values })) => Verdict::Values(values),
+            Some(Outcome::Descriptors(v1::TrialDescriptors { values })) => Verdict::Values(values),
             Some(Outcome::Failure(v1::ItemFailure { message })) => Verdict::Failed(message),
             None => return (nonsense("it does not answer the request"), None),
         };

@@ -77,6 +77,7 @@ fn assignment(assignment: &Assignment) -> v1::Assignment {
 pub fn item_result(result: v1::ItemResult) -> ItemResult {
     let output = match result.outcome {
         Some(Outcome::Measures(_)) => Output::Measures,
+        Some(Outcome::Descriptors(_)) => Output::Descriptors,
         _ => Output::Fitness,
     };
     ItemResult {
@@ -85,6 +86,7 @@ pub fn item_result(result: v1::ItemResult) -> ItemResult {
         outcome: match result.outcome {
             Some(Outcome::Fitness(fitness)) => Ok(fitness.values),
             Some(Outcome::Measures(measures)) => Ok(measures.values),
+            Some(Outcome::Descriptors(descriptors)) => Ok(descriptors.values),
             Some(Outcome::Failure(failure)) => Err(printable(&failure.message)),
             None => Err("no outcome".to_owned()),
         },

@@ -11,7 +11,7 @@ use std::{
 };
 
 use coordinator::referee::{Referee, RefereeProgram, RefereeRequest, Verdict};
-use experiment_file::ExperimentConfig;
+use experiment_file::{DescriptorConfig, ExperimentConfig, Summarises};
 use sim_core::{Output, Simulation, TrialSet};
 use tempfile::TempDir;
 use tokio::time::{sleep, timeout};
@@ -146,7 +146,15 @@ async fn values_are_those_of_the_simulation_to_the_bit() {
     // These are more experiments than the process keeps compiled. When they come again, it still
     // has some of them.
     for seed in [0, 1, 2, 3, 4, 5, 0, 5, 3, 4, 1, 1] {
-        let config = config(|config| config.seed = seed);
+        let config = config(|config| {
+            config.seed = seed;
+            config.algorithm.descriptors = vec![DescriptorConfig {
+                measure: "leaders".to_owned(),
+                summarises: Summarises::Mean,
+                range: [0.0, 5.0],
+                cells: 5,
+            }];
+        });
         let simulation = Simulation::compile(&config).unwrap();
         for trial_set in [
             TrialSet::Generation(3),
@@ -154,13 +162,16 @@ async fn values_are_those_of_the_simulation_to_the_bit() {
             TrialSet::Judgement(3),
             TrialSet::Evaluation,
         ] {
-            for output in [Output::Fitness, Output::Measures] {
+            for output in [Output::Fitness, Output::Measures, Output::Descriptors] {
                 let request = RefereeRequest { trial_set, output, ..request(&config) };
                 let RefereeRequest { genotype, trials, .. } = request.clone();
                 let expected = match output {
                     Output::Fitness => simulation.evaluate(&genotype, trial_set, trials),
                     Output::Measures => simulation
                         .measure_while(&genotype, trial_set, trials, &|| true)
+                        .map(Option::unwrap),
+                    Output::Descriptors => simulation
+                        .describe_while(&genotype, trial_set, trials, &|| true)
                         .map(Option::unwrap),
                 };
                 let Verdict::Values(values) = referee.evaluate(&request).await else {
@@ -172,7 +183,7 @@ async fn values_are_those_of_the_simulation_to_the_bit() {
         }
     }
     let stats = referee.stats();
-    assert_eq!((stats.n_values, stats.n_unavailable), (12 * 4 * 2, 0));
+    assert_eq!((stats.n_values, stats.n_unavailable), (12 * 4 * 3, 0));
     assert!(stats.busy > Duration::ZERO);
 }
 

@@ -3,7 +3,10 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{FitnessFunction, FitnessParams, GenotypeQuery, NamedMap, Params, limits, schema};
+use super::{
+    DescriptorConfig, FitnessFunction, FitnessParams, GenotypeQuery, NamedMap, Params, limits,
+    schema,
+};
 use crate::DefaultValue::{Depends, Empty, Null, Required};
 use crate::Domain;
 use crate::parameters::parameters;
@@ -29,6 +32,10 @@ parameters! {
         /// Constants of fitness functions.
         fitness_params: FitnessParams =
             of(Domain::Object(FitnessParams::OBJECT), Empty).recent(),
+        /// What tells behaviours apart, for algorithms that evolve a repertoire of different ones
+        /// (MAP-Elites, DNS). A single descriptor needs no list.
+        descriptors: Vec<DescriptorConfig> =
+            of(Domain::Objects(DescriptorConfig::OBJECT, limits::DESCRIPTORS), Null),
         /// Stop when the mean fitness of a generation reaches this.
         target_fitness: Option<f64> = of(Domain::QUANTITY, Null),
         /// Generations between two comparisons of candidates for the champion. The last comparison
@@ -38,7 +45,8 @@ parameters! {
         champion_trials: u32 = whole([1, limits::TRIALS], 50),
         // Digests of generations do not cover this key: they hash the canonical form with 0, which
         // omits it.
-        /// Trials that judge the champion at the end of a run and select nothing.
+        /// Trials that judge the champion at the end of a run, and every elite of a repertoire. They
+        /// select nothing.
         judgement_trials: u32 = whole([1, limits::TRIALS], 200).unless_zero(),
     }
     parts {

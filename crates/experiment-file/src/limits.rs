@@ -46,6 +46,13 @@ pub const GENES_PER_GENERATION: u64 = 50_000_000;
 /// checkpoint has 10 to 20 MB. The time grows with the cube of the number of genes.
 pub const GENES_OF_FULL_MATRIX: u64 = 1_000;
 
+/// Descriptors of a behaviour.
+pub const DESCRIPTORS: usize = 8;
+/// Elites of a repertoire, and cells of a grid of descriptors.
+pub const ELITES: u32 = 16_384;
+/// Genes of all elites of a repertoire together: a checkpoint has 8 bytes for each.
+pub const GENES_OF_REPERTOIRE: u64 = 10_000_000;
+
 /// Euler steps of spiking networks, ms: the shortest time constants of their synapses and
 /// decoders are 5 ms.
 pub const SPIKING_DT: RangeInclusive<f64> = 0.001..=2.0;

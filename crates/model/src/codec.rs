@@ -63,6 +63,7 @@ pub fn output(output: Output) -> v1::Output {
     match output {
         Output::Fitness => v1::Output::Fitness,
         Output::Measures => v1::Output::Measures,
+        Output::Descriptors => v1::Output::Descriptors,
     }
 }
 
@@ -71,6 +72,7 @@ pub fn read_output(output: v1::Output) -> Option<Output> {
     match output {
         v1::Output::Fitness => Some(Output::Fitness),
         v1::Output::Measures => Some(Output::Measures),
+        v1::Output::Descriptors => Some(Output::Descriptors),
         v1::Output::Unspecified => None,
     }
 }
@@ -93,7 +95,7 @@ mod tests {
         ] {
             assert_eq!(read_trial_set(Some(trial_set(set))), Ok(set));
         }
-        for wanted in [Output::Fitness, Output::Measures] {
+        for wanted in [Output::Fitness, Output::Measures, Output::Descriptors] {
             assert_eq!(read_output(output(wanted)), Some(wanted));
         }
         assert_eq!(read_output(v1::Output::Unspecified), None);

@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::testing::{experiment_a, genotype, robot};
-use experiment_file::{GenotypeQuery, SynapseSelector};
+use experiment_file::{
+    DescriptorConfig, GenotypeQuery, ScriptConfig, Summarises, SynapseSelector, TaskConfig,
+};
 
 #[test]
 fn the_genotype_of_experiment_a_has_about_455_genes() {
@@ -155,4 +157,71 @@ fn the_network_can_be_read() {
     assert_eq!(json["neurons"][0]["bias"], 0.0);
     assert_eq!(json["neurons"][0]["activation"], "sigmoid");
     assert_eq!(json["stimuli"][2]["sensor"], "wireless_receiver:receiving_direction");
+}
+
+/// Descriptors of a fitness function and of a script.
+fn described() -> ExperimentConfig {
+    let mut config = experiment_a();
+    let script =
+        "def measures(world):\n    return {'late': world.step if world.step > 297 else None}";
+    config.task =
+        Some(TaskConfig { script: ScriptConfig { name: "late.star".into(), text: script.into() } });
+    let descriptor = |measure: &str, summarises| DescriptorConfig {
+        measure: measure.to_owned(),
+        summarises,
+        range: [0.0, 1.0],
+        cells: 4,
+    };
+    config.algorithm.descriptors = vec![
+        descriptor("one_leader", Summarises::Mean),
+        descriptor("leaders", Summarises::End),
+        descriptor("late", Summarises::Mean),
+    ];
+    config
+}
+
+#[test]
+fn descriptors_are_means_and_last_values_of_the_measures() {
+    let simulation = Simulation::compile(&described()).unwrap();
+    assert_eq!(simulation.n_descriptors(), 3);
+    let genotype = genotype(simulation.genotype_len(), 2);
+    let describe = |trials| {
+        let described = simulation.describe_while(&genotype, 5, trials, &|| true);
+        described.unwrap().unwrap()
+    };
+    let together = describe(0..40);
+    let fitness = simulation.evaluate(&genotype, 5, 0..40).unwrap();
+    for (trial, row) in (0..).zip(together.chunks_exact(4)) {
+        assert_eq!(row[0].to_bits(), fitness[trial as usize].to_bits());
+        let mut last = f64::NAN;
+        let observe = &mut |step: &StepRecord| last = step.measures["leaders"];
+        let watched = simulation.simulate(&genotype, 5, trial, observe).unwrap();
+        assert_eq!(row[1].to_bits(), watched.measures["one_leader"].to_bits());
+        assert_eq!(row[2..], [last, 298.5]);
+    }
+    assert_eq!(describe(31..33), together[31 * 4..33 * 4]);
+    let stopped = simulation.describe_while(&genotype, 5, 0..1, &|| false);
+    assert_eq!(stopped, Ok(None));
+}
+
+#[test]
+fn a_trial_without_a_measure_has_a_nan_of_certain_bits() {
+    let mut config = described();
+    config.task.as_mut().unwrap().script.text =
+        "def measures(world):\n    return {'late': 1 if world.step > 999 else None}".into();
+    let simulation = Simulation::compile(&config).unwrap();
+    let genotype = genotype(simulation.genotype_len(), 2);
+    let row = simulation.describe_while(&genotype, 5, 0..1, &|| true).unwrap().unwrap();
+    assert_eq!(row[3].to_bits(), f64::NAN.to_bits());
+}
+
+#[test]
+fn a_descriptor_of_an_unknown_measure_is_refused_with_the_known_ones() {
+    let mut config = described();
+    config.algorithm.descriptors[1].measure = "leader".to_owned();
+    let refused = Simulation::compile(&config).unwrap_err().to_string();
+    assert_eq!(
+        refused,
+        "algorithm.descriptors[1].measure: the task has no measure `leader`; did you mean `leaders`?"
+    );
 }

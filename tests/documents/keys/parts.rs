@@ -180,6 +180,7 @@ const EVOLUTION: &[Section] = &[
     at("algorithm", &[("AlgorithmConfig", "")]),
     at("algorithm.fitness_function", &[("FitnessFunction", "")]),
     at("algorithm.fitness_params", &[("FitnessParams", "")]),
+    at("algorithm.descriptors", &[("DescriptorConfig", "")]),
     at("algorithm.populations.NAME", &[("PopulationConfig", "")]),
     apart("algorithm.populations.NAME.params", &[("PopulationConfig/properties/params/anyOf", "")]),
 ];

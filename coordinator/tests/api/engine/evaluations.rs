@@ -86,9 +86,24 @@ fn a_result_of_the_wrong_kind_is_proof_enough() {
 
 #[test]
 fn measures_that_differ_in_one_bit_of_one_number_are_noticed() {
+    a_difference_is_noticed(Output::Measures, |fleet| evaluate(fleet, 2));
+}
+
+#[test]
+fn descriptors_that_differ_in_one_bit_are_noticed() {
+    a_difference_is_noticed(Output::Descriptors, |fleet| {
+        fleet.submit(EXPERIMENT, 100);
+        let set = TrialSet::Generation(0);
+        let batch = Batch::described(set, vec![vec![0.5]].into(), 2, N_VALUES - 1);
+        fleet.tell(|engine, now| engine.on_batch_requested(now, EXPERIMENT, batch));
+    });
+}
+
+/// Of two workers, one returns a wrong bit in the last number of an item.
+fn a_difference_is_noticed(output: Output, request: impl Fn(&mut SimulatedFleet)) {
     let config = EngineConfig { audit_fraction: 1.0, ..EngineConfig::new(LEASE) };
     let mut fleet = SimulatedFleet::new(MODEL, config);
-    evaluate(&mut fleet, 2);
+    request(&mut fleet);
     let workers = [(); 2].map(|()| fleet.join_by_hand(1));
     for turn in 0.. {
         assert!(turn < 20, "nobody noticed");
@@ -99,7 +114,7 @@ fn measures_that_differ_in_one_bit_of_one_number_are_noticed() {
             let last = values.last_mut().unwrap();
             *last = f64::from_bits(last.to_bits() ^ 1);
         }
-        fleet.answer_with(worker, assignment.id, Output::Measures, Ok(values));
+        fleet.answer_with(worker, assignment.id, output, Ok(values));
         if fleet.n_questions > 0 {
             break;
         }

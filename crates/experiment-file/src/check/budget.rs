@@ -2,8 +2,8 @@
 
 use crate::report::{Path, Report};
 use crate::{
-    AlgorithmDescription, BlockedBy, ExperimentConfig, ObjectConfig, RobotConfig, RobotController,
-    Shape, SynapseModel, TopologyConfig, WorldConfig, limits,
+    AlgorithmDescription, BlockedBy, DescriptorConfig, ExperimentConfig, Keeps, ObjectConfig,
+    RobotConfig, RobotController, Shape, SynapseModel, TopologyConfig, WorldConfig, limits,
 };
 
 pub(super) fn check(
@@ -153,6 +153,21 @@ fn generation(
     if let Some(genes_max) = description.and_then(|description| description.genes_max) {
         let what = "possible genes for an algorithm with a full matrix";
         limit(n_genes, genes_max, what, &algorithm.key("name"), &parts, report);
+    }
+    if let Some(description) = description.filter(|found| found.keeps == Keeps::Repertoire) {
+        let n_cells = DescriptorConfig::n_cells(&config.algorithm.descriptors);
+        for (name, population) in &config.algorithm.populations {
+            let path = algorithm.key("populations").key(name);
+            let n_elites = description.elites_max(&population.params, n_cells);
+            let cost = n_elites.saturating_mul(n_genes);
+            let what = "possible genes of all elites";
+            let parts = [&topology, &algorithm.key("descriptors"), &algorithm.key("name")];
+            limit(cost, limits::GENES_OF_REPERTOIRE, what, &path, &parts, report);
+            let n_judged = n_elites * u64::from(config.algorithm.judgement_trials);
+            let what = "trials that judge all elites";
+            let path = algorithm.key("judgement_trials");
+            limit(n_judged, limits::TRIALS_PER_GENERATION, what, &path, &parts[1..], report);
+        }
     }
 }
 

@@ -7,6 +7,7 @@
 mod bodies;
 mod budget;
 mod coverage;
+mod descriptors;
 mod encoding;
 mod genotype;
 mod learning;
@@ -27,6 +28,7 @@ pub(super) fn check(
 ) {
     network::check(&config.topology, report);
     genotype::check(config, algorithm, report);
+    descriptors::check(config, algorithm, report);
     world::check(config, report);
     bodies::check(config, report);
     task::check(config, report);

@@ -46,6 +46,8 @@ pub enum Keeps {
     Matrix,
     /// A population.
     Population,
+    /// Elites of different behaviour, up to [`limits::ELITES`](crate::limits::ELITES).
+    Repertoire,
 }
 
 /// How an algorithm makes use of the individuals of a generation.
@@ -55,6 +57,8 @@ pub enum LearnsFrom {
     Ranks,
     /// It learns from their ranks, and draws individuals in pairs, on both sides of the mean.
     Pairs,
+    /// It learns from fitness and [descriptors](crate::DescriptorConfig).
+    Descriptors,
 }
 
 /// Number of individuals below which an algorithm learns next to nothing.
