@@ -61,7 +61,7 @@ impl Resimulation {
         Ok(Self::Here { n_threads, isa: isa.get() })
     }
 
-    /// The fitness of the genotypes of a batch, trial by trial.
+    /// The numbers of the genotypes of a batch, trial by trial.
     pub async fn simulate(
         &self,
         simulation: &Simulation,
@@ -85,7 +85,6 @@ async fn fleet(
     config_json: &str,
     batch: &Batch,
 ) -> Result<Vec<Vec<f64>>, Error> {
-    let n_trials = batch.trial_fitness.first().map_or(0, Vec::len);
     let genotype_len = batch.genotypes.first().map_or(1, |genes| size_of_val(&**genes).max(1));
     let mut fitness = Vec::new();
     for genotypes in batch.genotypes.chunks((REQUEST_LEN / genotype_len).max(1)) {
@@ -93,8 +92,9 @@ async fn fleet(
             config_json: config_json.to_owned(),
             genotypes: genotypes.iter().map(|genes| Genes { values: genes.clone() }).collect(),
             trials: Some(trials(batch.trial_set)),
-            trial_count: n_trials as u32,
+            trial_count: batch.n_trials(),
             priority: None,
+            descriptors: batch.values_per_trial > 1,
         };
         fitness.extend(connection.fitness(request, HERE).await?);
     }
@@ -129,8 +129,8 @@ fn here(
                 while let Some((genotype, trials)) = items.get(next.fetch_add(1, Ordering::Relaxed))
                 {
                     let genes = &batch.genotypes[*genotype];
-                    let fitness = simulation.evaluate(genes, batch.trial_set, trials.clone());
-                    let result = (*genotype, trials.start, fitness);
+                    let values = simulate(simulation, batch, genes, trials.clone());
+                    let result = (*genotype, trials.start, values);
                     done.lock().unwrap_or_else(PoisonError::into_inner).push(result);
                 }
             });
@@ -145,11 +145,25 @@ fn here(
     Ok(fitness)
 }
 
+/// The numbers of a genotype, trial by trial.
+fn simulate(
+    simulation: &Simulation,
+    batch: &Batch,
+    genes: &[f64],
+    trials: Range<u32>,
+) -> Result<Vec<f64>, EvaluateError> {
+    if batch.values_per_trial == 1 {
+        return simulation.evaluate(genes, batch.trial_set, trials);
+    }
+    let described = simulation.describe_while(genes, batch.trial_set, trials, &|| true)?;
+    Ok(described.unwrap_or_default())
+}
+
 /// Genotypes and trials, in portions.
 fn items(batch: &Batch) -> Vec<(usize, Range<u32>)> {
     let mut items = Vec::new();
-    for (genotype, fitness) in batch.trial_fitness.iter().enumerate() {
-        let n_trials = fitness.len() as u32;
+    for (genotype, values) in batch.values.iter().enumerate() {
+        let n_trials = (values.len() / batch.values_per_trial) as u32;
         for first in (0..n_trials).step_by(TRIALS_PER_ITEM as usize) {
             items.push((genotype, first..n_trials.min(first + TRIALS_PER_ITEM)));
         }

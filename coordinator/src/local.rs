@@ -12,7 +12,7 @@ use crate::{
     control::{Existing, Placement, place},
     ids::ExperimentId,
     limits::UNFINISHED_MAX,
-    runs::{describe, describe_judgement},
+    runs::{describe, describe_judgement, describe_repertoire},
     store::{
         Entry, ExperimentRecord, ExperimentState, GenerationCommit, GenerationRecord, Store,
         StoreError,
@@ -145,6 +145,7 @@ impl LocalRun {
         }
         if !told.end.judgement.is_empty() {
             notices.extend(outcome.champion.as_ref().map(describe_judgement));
+            notices.extend(describe_repertoire(evolution, &told.end));
         }
         let bytes = told.to_bytes();
         let keyframe = evolution.is_keyframe_due(bytes.len()).then(|| evolution.keyframe());

@@ -4,7 +4,7 @@
 use std::fmt;
 
 use evolution::ALGORITHMS;
-use experiment_file::Keeps;
+use experiment_file::{Keeps, limits};
 
 use crate::store::Summary;
 
@@ -38,6 +38,11 @@ pub fn estimate(summary: &Summary, genotype_len: u64) -> u64 {
             .saturating_mul(BYTES_PER_GENE_OF_MATRIX)
             .saturating_add(genotype_len.saturating_mul(genotype_len) * BYTES_PER_ENTRY),
         Keeps::Population => n_genes.saturating_mul(BYTES_PER_GENE_OF_POPULATION),
+        Keeps::Repertoire => {
+            let of_elites = u64::from(limits::ELITES).saturating_mul(genotype_len);
+            let of_elites = of_elites.min(limits::GENES_OF_REPERTOIRE);
+            n_genes.saturating_add(of_elites).saturating_mul(BYTES_PER_GENE)
+        }
     };
     let n_trials = algorithm.population_size.saturating_mul(algorithm.num_evaluations);
     [

@@ -26,6 +26,10 @@ const DRAWN_PER_GENE: u128 = 4;
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Evolution(Shared<State>);
 
+/// The answer to fitness without descriptors.
+const REPERTOIRE: &str = "a repertoire learns from descriptors, too, which a fleet computes: run the \
+                          experiment on one (`swarmevo.local_fleet()`), or by `swarmctl run`";
+
 /// A generation: index, best, mean, min, standard deviation, number of individuals
 /// without a finite fitness.
 type Summary = (u64, f64, f64, f64, f64, usize);
@@ -114,6 +118,9 @@ impl Evolution {
     ) -> PyResult<(Summary, Vec<String>, Option<String>)> {
         let fitness = rows(&fitness);
         let learnt = self.0.with(py, |state| {
+            if state.evolution.n_descriptors() > 0 {
+                return Err(NotTold::Rows(REPERTOIRE.to_owned()));
+            }
             let asked = state.asked.get_or_insert_with(|| state.evolution.ask());
             check_rows(&fitness, asked.genotypes.len()).map_err(NotTold::Rows)?;
             let mut after = state.evolution.clone();

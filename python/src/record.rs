@@ -88,8 +88,8 @@ impl Record {
     ) -> PyResult<()> {
         let all = |blocks: &Blocks<'_>| blocks.iter().map(rows).collect::<Vec<_>>();
         let judgement = judgement.map_or_else(Vec::new, |judgement| rows(&judgement).concat());
-        let end = End { blocks: all(&end_blocks), judgement };
-        let told = Told { trial_fitness: rows(&fitness), blocks: all(&blocks), end };
+        let end = End { blocks: all(&end_blocks), judgement, ..End::default() };
+        let told = Told { blocks: all(&blocks), end, ..Told::from_fitness(rows(&fitness)) };
         let duration = Duration::try_from_secs_f64(seconds);
         let duration = duration.map_err(|error| PyValueError::new_err(error.to_string()))?;
         let evolution = evolution.state(py)?;

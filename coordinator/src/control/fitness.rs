@@ -24,6 +24,8 @@ pub struct FitnessOrder {
     pub trial_set: TrialSet,
     /// Trials of each genotype, from trial 0.
     pub n_trials: u32,
+    /// Whether each trial has its descriptors after its fitness.
+    pub with_descriptors: bool,
     /// Priority against other jobs.
     pub priority: Priority,
 }
@@ -38,7 +40,7 @@ impl FitnessOrder {
 
     /// Checks an order completely; CPU-bound.
     fn check(self, files: &ExperimentFiles) -> Result<Evaluation, ControlError> {
-        let Self { config_json, genotypes, trial_set, n_trials, priority } = self;
+        let Self { config_json, genotypes, trial_set, n_trials, with_descriptors, priority } = self;
         let invalid = |what: String| Err(ControlError::Invalid(what));
         if n_trials == 0 || n_trials > limits::TRIALS {
             return invalid(format!(
@@ -60,7 +62,15 @@ impl FitnessOrder {
             let checked = file.simulation.check_genotype(genotype);
             checked.map_err(|error| ControlError::Invalid(error.to_string()))?;
         }
-        let batch = Batch::fitness(trial_set, genotypes.into(), n_trials);
+        let n_descriptors = if with_descriptors { file.simulation.n_descriptors() } else { 0 };
+        if n_values * (1 + n_descriptors) > EVALUATION_VALUES_MAX {
+            return invalid(format!(
+                "genotypes times trials are {n_values}, each with {n_descriptors} descriptors; the \
+                 limit is {EVALUATION_VALUES_MAX} numbers"
+            ));
+        }
+        let genotypes = genotypes.into();
+        let batch = Batch::described(trial_set, genotypes, n_trials, n_descriptors);
         Ok(Evaluation { name: file.name.clone(), spec: file.spec.clone(), batch, priority })
     }
 }

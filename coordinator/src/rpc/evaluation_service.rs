@@ -77,6 +77,7 @@ impl EvaluationService for Evaluations {
             genotypes: request.genotypes.into_iter().map(|genes| genes.values).collect(),
             trial_set: trial_set(request.trials)?,
             n_trials: request.trial_count,
+            with_descriptors: request.descriptors,
             priority: request.priority.map_or(Ok(Priority::default()), convert::priority)?,
         };
         let fitness = tokio::select! {

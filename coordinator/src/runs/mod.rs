@@ -52,7 +52,9 @@ use crate::{
 pub use change_queue::{Change, PendingChange, Request, RequestId};
 pub use evaluations::Evaluation;
 pub use messages::{Command, CommitOutcome, RunId};
-pub use round::{Next, ReadyToCommit, Round, completion, describe, describe_judgement};
+pub use round::{
+    Next, ReadyToCommit, Round, completion, describe, describe_judgement, describe_repertoire,
+};
 pub use runnable::Runnable;
 pub use stats::RunStats;
 
@@ -340,7 +342,8 @@ impl Runs {
     fn evaluate(&mut self, id: ExperimentId, round: Round) {
         let Some(run) = self.runs.get_mut(&id) else { return };
         let n_trials = round.n_trials(&run.config);
-        let batch = Batch::fitness(round.trial_set(), round.genotypes(), n_trials);
+        let (set, genotypes) = (round.trial_set(), round.genotypes());
+        let batch = Batch::described(set, genotypes, n_trials, round.n_descriptors());
         let batch = Batch { distribution: round.distribution(), ..batch };
         self.commands.push_back(Command::Evaluate { job: id.into(), batch });
         run.stage = Stage::Evaluating(round);

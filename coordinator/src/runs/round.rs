@@ -1,6 +1,6 @@
 //! Rounds, and their conclusions. A round is a generation, a re-evaluation of candidates for the
-//! champion on held-out trials, or at the end the judgement of the champion on trials that select
-//! nothing.
+//! champion on held-out trials, or at the end the judgement of the champion and of all elites on trials
+//! that select nothing.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub enum Round {
     /// Candidates on a block of held-out trials, after a generation that evolution has learnt
     /// from and that is not committed yet.
     Reevaluation(Box<UpdatedEvolution>, Box<Reevaluation>),
-    /// The champion on trials that select nothing, after the last generation, which is
+    /// The champion and the elites of a repertoire on trials that select nothing, after the last generation, which is
     /// not committed yet.
     Judgement(Box<ReadyToCommit>, Box<Judgement>),
 }
@@ -103,6 +103,15 @@ impl Round {
         }
     }
 
+    /// Descriptors of each trial.
+    pub fn n_descriptors(&self) -> usize {
+        match self {
+            Self::Generation(evolution, _) => evolution.n_descriptors(),
+            Self::Reevaluation(..) => 0,
+            Self::Judgement(_, judgement) => judgement.values_per_trial() - 1,
+        }
+    }
+
     /// Trials of each genotype.
     pub fn n_trials(&self, config: &ExperimentConfig) -> u32 {
         match self {
@@ -160,10 +169,12 @@ impl Round {
                 })
             }
             Self::Judgement(mut ready, judgement) => {
+                let blocks = std::mem::take(&mut ready.told.end.blocks);
+                ready.told.end = End { blocks, ..judgement.end(&evaluated.values) };
                 let (champion, digest) = judgement.decide(&evaluated.values);
-                ready.told.end.judgement = evaluated.values.concat();
                 ready.notices.extend(evaluated.notices.iter().cloned());
                 ready.notices.push(describe_judgement(&champion));
+                ready.notices.extend(describe_repertoire(&ready.evolution, &ready.told.end));
                 ready.digest = digest.to_string();
                 ready.champion = Some(champion);
                 Ok(Next::Commit(ready))
@@ -207,20 +218,19 @@ fn learn(
     generation: evolution::Generation,
     evaluated: &EvaluatedBatch,
 ) -> Result<UpdatedEvolution, EvolutionError> {
-    let learnt =
-        evolution.learn(generation, &evaluated.values, |summary| completion(config, summary))?;
+    let told = Told::from_values(&evaluated.values, evolution.n_descriptors());
+    let learnt = evolution.learn(generation, &told, |summary| completion(config, summary))?;
     let Learnt { summary, notices: remarks, completed } = learnt;
     let generation = GenerationRecord {
         generation: summary.generation,
         statistics: summary.statistics,
         digest: summary.digest.to_string(),
         duration_ms: evaluated.duration.as_millis() as u64,
-        episodes: evaluated.values.iter().map(|trials| trials.len() as u64).sum(),
+        episodes: told.trial_fitness.iter().map(|trials| trials.len() as u64).sum(),
         workers: evaluated.n_workers as u64,
         idle_share: evaluated.idle_share,
     };
     let notices = [evaluated.notices.clone(), remarks].concat();
-    let told = Told::from_fitness(evaluated.values.clone());
     Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
 }
 
@@ -267,4 +277,23 @@ pub fn describe_judgement(champion: &Champion) -> String {
         ),
         None => "champion not judged: its fitness is not finite in every trial".to_owned(),
     }
+}
+
+/// Describes the repertoire at the end of a run by its corrected figures, for the log; `None` without
+/// a repertoire.
+pub fn describe_repertoire(evolution: &Evolution, end: &End) -> Option<String> {
+    let repertoire = evolution.elites(end)?;
+    let n_elites = repertoire.elites.len();
+    let Some(figures) = repertoire.figures() else {
+        return Some(format!(
+            "repertoire: none of {n_elites} elites has finite values in every trial"
+        ));
+    };
+    Some(format!(
+        "repertoire judged: QD score {}, coverage {:.0} %, and {:.0} % of {n_elites} elites stay in \
+         their cell",
+        number(figures.qd_score, 6),
+        100.0 * figures.coverage,
+        100.0 * figures.stay,
+    ))
 }

@@ -3,7 +3,7 @@
 use std::{fs, io::Write as _, sync::OnceLock};
 
 use evolution::{ALGORITHMS, Evolution, Fork, Told};
-use experiment_file::ExperimentConfig;
+use experiment_file::{DescriptorConfig, ExperimentConfig, Params, Summarises};
 use sim_core::{FINGERPRINT, Simulation};
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
@@ -27,10 +27,12 @@ fn config() -> ExperimentConfig {
 }
 
 fn simulated(simulation: &Simulation, batch: &Batch) -> Vec<Vec<f64>> {
-    let n_trials = batch.trial_fitness[0].len() as u32;
-    let fitness =
-        |genes: &Vec<f64>| simulation.evaluate(genes, batch.trial_set, 0..n_trials).unwrap();
-    batch.genotypes.iter().map(fitness).collect()
+    let (set, trials) = (batch.trial_set, 0..batch.n_trials());
+    let values = |genes: &Vec<f64>| match batch.values_per_trial {
+        1 => simulation.evaluate(genes, set, trials.clone()).unwrap(),
+        _ => simulation.describe_while(genes, set, trials.clone(), &|| true).unwrap().unwrap(),
+    };
+    batch.genotypes.iter().map(values).collect()
 }
 
 /// A complete run; `change`: replaces the fitness of a generation.
@@ -53,11 +55,16 @@ fn evolved(
             let fitness = |genes: &Vec<f64>| simulation.evaluate(genes, set, 0..n_trials).unwrap();
             genotypes.iter().map(fitness).collect::<Vec<_>>()
         };
+        let describe = |set: sim_core::TrialSet, genotypes: &[Vec<f64>], n_trials| {
+            let values =
+                |genes: &Vec<f64>| simulation.describe_while(genes, set, 0..n_trials, &|| true);
+            genotypes.iter().map(|genes| values(genes).unwrap().unwrap()).collect::<Vec<_>>()
+        };
         let asked = evolution.ask();
-        let mut fitness = evaluate(generation.into(), &asked.genotypes, algorithm.num_evaluations);
-        change(generation, &mut fitness);
-        let mut told = Told::from_fitness(fitness);
-        let summary = evolution.tell(asked, &told.trial_fitness).unwrap();
+        let mut values = describe(generation.into(), &asked.genotypes, algorithm.num_evaluations);
+        change(generation, &mut values);
+        let mut told = Told::from_values(&values, simulation.n_descriptors());
+        let summary = evolution.tell(asked, &told).unwrap();
         if evolution.n_generations().is_multiple_of(algorithm.champion_every) {
             let mut round = evolution.reevaluation().unwrap();
             while !round.is_over() {
@@ -70,8 +77,8 @@ fn evolved(
         if evolution.n_generations() == algorithm.generations {
             let judgement = evolution.judgement().unwrap();
             let trials = algorithm.judgement_trials;
-            let values = evaluate(judgement.trial_set(), &judgement.genotypes(), trials);
-            told.end.judgement = values.concat();
+            let values = describe(judgement.trial_set(), &judgement.genotypes(), trials);
+            told.end = judgement.end(&values);
             let judged = judgement.decide(&values);
             (champion, digest) = (Some(judged.0), judged.1);
         }
@@ -164,6 +171,48 @@ pub fn contents(bundle: &Bundle) -> Vec<(&'static str, Vec<u8>)> {
     let description = description::describe(bundle, &files).into_bytes();
     let files = files.into_iter().map(|file| (file.name, file.content));
     [(description::DESCRIPTION, description)].into_iter().chain(files).collect()
+}
+
+/// The experiment with a repertoire of two descriptors.
+fn with_repertoire() -> ExperimentConfig {
+    let mut config = config();
+    config.algorithm.name = "MAP-Elites".to_owned();
+    let [leaders, turns] = [Summarises::Mean, Summarises::End].map(|summarises| DescriptorConfig {
+        measure: "leaders".to_owned(),
+        summarises,
+        range: [0.0, 5.0],
+        cells: 3,
+    });
+    config.algorithm.descriptors = vec![leaders, turns];
+    config.algorithm.populations[0].params = Params::default();
+    ExperimentConfig::from_json(&config.to_canonical_json(), "", ALGORITHMS).unwrap().0
+}
+
+#[test]
+fn a_repertoire_is_proven_and_a_lie_in_one_descriptor_is_found() {
+    let config = with_repertoire();
+    let honest = evolved(&config, started(&config), None, Vec::new(), |_, _| ());
+    let read = Bundle::read(&honest.to_bytes().unwrap()).unwrap();
+    verify(&read, Sample::All).unwrap();
+    // The last number of a trial is its second descriptor.
+    let lie = |generation: u64, values: &mut Vec<Vec<f64>>| {
+        if generation == 2 {
+            let last = values[1].last_mut().unwrap();
+            *last = f64::from_bits(last.to_bits() ^ 1);
+        }
+    };
+    let lying = evolved(&config, started(&config), None, Vec::new(), lie);
+    links(&lying).unwrap();
+    let flaw = verify(&lying, Sample::All).unwrap_err();
+    assert_eq!(flaw.claim, Claim::Simulation, "{flaw}");
+    assert!(flaw.what.contains("descriptors"), "{flaw}");
+    // The judgement of elites is simulated again in any case.
+    let mut lying = honest;
+    let last = lying.log.last_mut().unwrap();
+    let mut told = Told::from_bytes(last).unwrap();
+    *told.end.elites[0].last_mut().unwrap() += 1.0;
+    *last = told.to_bytes();
+    assert_eq!(links(&lying).unwrap_err().claim, Claim::Champion);
 }
 
 #[test]

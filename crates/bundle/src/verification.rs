@@ -74,8 +74,11 @@ pub struct Batch {
     pub trial_set: TrialSet,
     /// The genotypes.
     pub genotypes: evolution::Population,
-    /// The fitness in the log; shape `[genotype][trial]`, trials from 0.
-    pub trial_fitness: Vec<Vec<f64>>,
+    /// The numbers in the log for each genotype: for each trial, from 0, its fitness and then its
+    /// descriptors.
+    pub values: Vec<Vec<f64>>,
+    /// Numbers per trial: 1 without descriptors.
+    pub values_per_trial: usize,
 }
 
 impl fmt::Display for Claim {
@@ -99,25 +102,30 @@ impl Claim {
 
 impl Batch {
     fn from_round(round: Round<'_>) -> Self {
-        let Round { trial_set, genotypes, trial_fitness } = round;
-        Self { trial_set, genotypes, trial_fitness: trial_fitness.to_vec() }
+        let Round { trial_set, genotypes, values, values_per_trial } = round;
+        Self { trial_set, genotypes, values: values.into_owned(), values_per_trial }
     }
 
-    /// Compares the log with simulated fitness of the same shape, bit for bit.
+    /// Number of trials of each genotype.
+    pub fn n_trials(&self) -> u32 {
+        self.values.first().map_or(0, |values| values.len() / self.values_per_trial) as u32
+    }
+
+    /// Compares the log with simulated numbers of the same shape, bit for bit.
     ///
     /// # Errors
     ///
     /// A flaw at the first difference.
     pub fn compare(&self, simulated: &[Vec<f64>]) -> Result<(), Flaw> {
         let flaw = |what: String| Claim::Simulation.flaw(format!("{}: {what}", self.trial_set));
-        if simulated.len() != self.trial_fitness.len() {
+        if simulated.len() != self.values.len() {
             return Err(flaw("the simulation is incomplete".to_owned()));
         }
-        for (i, (found, logged)) in simulated.iter().zip(&self.trial_fitness).enumerate() {
+        let has = if self.values_per_trial == 1 { "fitness" } else { "fitness and descriptors" };
+        for (i, (found, logged)) in simulated.iter().zip(&self.values).enumerate() {
             if !same_bits(found, logged) {
-                let what = format!(
-                    "genotype {i} has the fitness {found:?}, but the log states {logged:?}"
-                );
+                let what =
+                    format!("genotype {i} has the {has} {found:?}, but the log states {logged:?}");
                 return Err(flaw(what));
             }
         }
@@ -125,7 +133,7 @@ impl Batch {
     }
 
     fn n_episodes(&self) -> u64 {
-        self.trial_fitness.iter().map(|trials| trials.len() as u64).sum()
+        self.values.iter().map(|values| (values.len() / self.values_per_trial) as u64).sum()
     }
 }
 

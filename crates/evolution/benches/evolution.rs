@@ -1,8 +1,9 @@
 //! Measures the coordinator's work per generation, without fitness: ask and tell of 100 individuals
-//! with 445 genes, the size of experiment A.
+//! with 445 genes, the size of experiment A; for repertoires of 1,000 individuals, with a full grid
+//! of 64 x 64 cells.
 
 use divan::{Bencher, counter::ItemsCount};
-use evolution::{Evolution, Generation, Params, Setup};
+use evolution::{Axis, Evolution, Generation, Params, Setup, Told};
 
 const POPULATION_SIZE: u32 = 100;
 const N_GENES: usize = 445;
@@ -73,4 +74,41 @@ fn step(evolution: &mut Evolution, generation: Generation) -> Generation {
         generation.genotypes.iter().map(|genes| vec![sphere(genes); N_TRIALS]).collect();
     evolution.tell(generation, &trial_fitness).expect("all fitness is finite");
     evolution.ask()
+}
+
+#[divan::bench(args = [12, 100, 455], sample_count = 100)]
+fn map_elites(bencher: Bencher, n_genes: usize) {
+    repertoire(bencher, "MAP-Elites", n_genes);
+}
+
+/// As [`generation`], after enough generations to fill the grid.
+fn repertoire(bencher: Bencher, algorithm: &str, n_genes: usize) {
+    const SIZE: u32 = 1000;
+    let axes = vec![Axis { low: 0.0, high: 1.0, n_cells: 64 }; 2];
+    let setup = Setup { population_size: SIZE, seed: 1, axes, ..Setup::new(algorithm, n_genes) };
+    let mut evolution = setup.start().expect("the parameters are right");
+    for _ in 0..40 {
+        let told = described(&evolution, 1);
+        evolution.tell(evolution.ask(), &told).expect("all fitness is finite");
+    }
+    bencher
+        .counter(ItemsCount::new(SIZE))
+        .with_inputs(|| {
+            let generation = evolution.ask();
+            (evolution.clone(), generation, described(&evolution, N_TRIALS))
+        })
+        .bench_values(|(mut evolution, generation, told)| {
+            evolution.tell(generation, &told).expect("all fitness is finite");
+            (evolution.ask(), evolution)
+        });
+}
+
+/// Behaviours all over the grid, which differ from generation to generation.
+fn described(evolution: &Evolution, n_trials: usize) -> Told {
+    let shift = evolution.n_generations() as f64 * 0.618;
+    let row = |genes: &Vec<f64>| {
+        let place = |gene: f64| (1000.0 * gene + shift).fract();
+        [genes[0], place(genes[1]), place(genes[2])].repeat(n_trials)
+    };
+    Told::from_values(&evolution.ask().genotypes.iter().map(row).collect::<Vec<_>>(), 2)
 }

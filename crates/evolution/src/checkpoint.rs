@@ -12,7 +12,6 @@ use experiment_file::Keeps;
 
 use super::{
     Algorithm, Evolution, EvolutionError, Told,
-    algorithms::Strategy as _,
     wire::{decode, encode},
 };
 
@@ -114,6 +113,8 @@ fn generation_ns(algorithm: &Algorithm, population_size: u64) -> u64 {
     let d = algorithm.n_genes() as u64;
     let drawn = 20 * population_size * d;
     match algorithm.keeps() {
+        // Surviving takes about as long as drawing.
+        Keeps::Repertoire => 2 * drawn,
         Keeps::Vectors | Keeps::Population => drawn,
         // The time of a decomposition and of products with the matrix.
         Keeps::Matrix => drawn + d * d * (d + population_size) / 2,
@@ -127,6 +128,9 @@ fn state_len(algorithm: &Algorithm, population_size: u64) -> u64 {
         Keeps::Vectors => 6 * d,
         Keeps::Matrix => d * d,
         Keeps::Population => population_size * d,
+        Keeps::Repertoire => {
+            algorithm.repertoire().map_or(0, |repertoire| repertoire.n_kept() as u64 * d)
+        }
     };
     n_numbers * size_of::<f64>() as u64
 }

@@ -5,7 +5,8 @@
 //! omits values that cannot change a bit of a generation: the name is empty, `generations` is 0,
 //! `target_fitness` and `judgement_trials` are absent. Link g is SHA-256 of link g-1 (32 bytes),
 //! g (u64), every gene of every individual, every fitness of every trial of every individual
-//! (f64, bit for bit); numbers little-endian, individuals in index order.
+//! (f64, bit for bit), and every descriptor of every trial of every individual, if the experiment
+//! has descriptors; numbers little-endian, individuals in index order.
 //!
 //! A fork continues the chain of its parent. If the fork changes anything that link -1 covers, an
 //! extra link follows the parent's last one: SHA-256 of `swarmevo fork digest 1\n`, the parent's
@@ -15,7 +16,8 @@
 //! chain starts with 32 zero bytes. After each block of held-out trials, the next link is SHA-256
 //! of the previous link, the link of the latest generation, every gene of every candidate that met
 //! the block, and the fitness of each of these candidates in every trial. The judgement of the
-//! champion adds a link in the same way.
+//! champion adds a link in the same way, and then that of the elites of a repertoire, with the fitness
+//! and the descriptors of every trial.
 
 use std::{fmt, str::FromStr};
 
@@ -23,7 +25,7 @@ use experiment_file::ExperimentConfig;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::Genotype;
+use super::{Evaluations, Genotype};
 
 /// One link of the chain.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,12 +74,18 @@ impl Digest {
     }
 
     /// The link after this one.
-    pub fn next(self, generation: u64, genotypes: &[Genotype], trial_fitness: &[Vec<f64>]) -> Self {
+    pub fn next<'a>(
+        self,
+        generation: u64,
+        genotypes: &[Genotype],
+        told: impl Into<Evaluations<'a>>,
+    ) -> Self {
+        let Evaluations { fitness, descriptors } = told.into();
         let mut hash = Sha256::new();
         hash.update(self.0);
         hash.update(generation.to_le_bytes());
         let mut bytes = Vec::new();
-        for values in genotypes.iter().chain(trial_fitness) {
+        for values in genotypes.iter().chain(fitness).chain(descriptors) {
             bytes.resize(size_of_val(&values[..]), 0);
             for (bytes, value) in bytes.chunks_exact_mut(size_of::<f64>()).zip(values) {
                 bytes.copy_from_slice(&value.to_bits().to_le_bytes());

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Algorithm, CheckpointError, Evolution, Genotype,
-    algorithms::Strategy as _,
     checkpoint::VERSION,
     wire::{decode, encode},
 };

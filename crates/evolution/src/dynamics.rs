@@ -1,9 +1,7 @@
 //! Measures how evolution moves: the change of the distribution in a generation, and the
 //! agreement of its trials.
 
-use super::{
-    CheckpointError, Digest, Evolution, Told, algorithms::Strategy as _, statistics::between,
-};
+use super::{CheckpointError, Digest, Evolution, Told, statistics::between};
 
 /// The change of evolution in one generation.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,7 +96,7 @@ fn deviations_of_ranks(values: Vec<f64>) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ALGORITHMS, Setup};
+    use crate::{Setup, tests::by_fitness};
 
     #[test]
     fn trials_that_rank_alike_correlate_and_opposite_ones_do_not() {
@@ -128,7 +126,7 @@ mod tests {
 
     #[test]
     fn every_distribution_reports_its_step_and_its_width() {
-        for algorithm in ALGORITHMS {
+        for algorithm in by_fitness() {
             let mut evolution = Setup::new(algorithm.name, 6).start().unwrap();
             let mut same = evolution.clone();
             for _ in 0..3 {

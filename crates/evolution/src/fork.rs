@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use experiment_file::ExperimentConfig;
 
-use super::{Digest, Evolution, algorithms::Strategy as _};
+use super::{Digest, Evolution};
 
 /// The arguments of [`Evolution::fork`].
 #[derive(Debug, Clone, Copy)]
@@ -71,6 +71,12 @@ impl Evolution {
             problems.push(format!(
                 "algorithm.generations: is {}, but {} are done; ask for more",
                 child.generations, self.n_generations
+            ));
+        }
+        if parent.descriptors != child.descriptors {
+            problems.push(format!(
+                "algorithm.descriptors: are part of the state of {}, and cannot change in a fork",
+                parent.name
             ));
         }
         let names = |populations: &[&str]| populations.join(", ");

@@ -1,16 +1,21 @@
-//! The judgement of a champion: its honest fitness, on trials that selected nothing.
-
-use std::sync::Arc;
+//! The judgement of a champion, and of every elite of a repertoire: their honest fitness, on trials
+//! that selected nothing.
 
 use determinism::random::TrialSet;
 
-use super::{Champion, Digest, Population, champion::Judged, finite_mean, interval::interval};
+use super::{
+    Champion, Digest, End, Genotype, Population, champion::Judged, finite_mean, interval::interval,
+};
 
-/// A champion to judge.
+/// A champion to judge, and the elites of its repertoire.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
     generation: u64,
     champion: Champion,
+    /// Empty without a repertoire.
+    elites: Vec<Genotype>,
+    /// Numbers of a trial: its fitness, and its descriptors.
+    values_per_trial: usize,
     /// The last link of the generations' digest chain, which the next link covers.
     of_generations: Digest,
     /// The last link of the chain of re-evaluations.
@@ -26,7 +31,14 @@ impl Judgement {
         of_generations: Digest,
         digest: Digest,
     ) -> Self {
-        Self { generation, champion, of_generations, digest }
+        let elites = Vec::new();
+        Self { generation, champion, elites, values_per_trial: 1, of_generations, digest }
+    }
+
+    /// The same together with elites.
+    #[must_use]
+    pub(crate) fn with_elites(self, elites: Vec<Genotype>, n_descriptors: usize) -> Self {
+        Self { elites, values_per_trial: 1 + n_descriptors, ..self }
     }
 
     /// The trials of the judgement.
@@ -34,23 +46,58 @@ impl Judgement {
         TrialSet::Judgement(self.generation)
     }
 
-    /// The champion's genotype, as a population of one.
+    /// The champion's genotype, and then those of the elites.
     pub fn genotypes(&self) -> Population {
-        Arc::new([self.champion.genotype.clone()])
+        [&self.champion.genotype].into_iter().chain(&self.elites).cloned().collect()
+    }
+
+    /// Numbers of a trial: its fitness, and its descriptors in repertoires.
+    pub fn values_per_trial(&self) -> usize {
+        self.values_per_trial
+    }
+
+    /// The judgement as [`End`] keeps it, without blocks. `values`: for each of
+    /// [`genotypes`](Self::genotypes) the numbers of all trials.
+    pub fn end(&self, values: &[Vec<f64>]) -> End {
+        let (champion, elites) =
+            values.split_first().map_or((&[][..], &[][..]), |(first, rest)| (&first[..], rest));
+        let judgement = champion.iter().copied().step_by(self.values_per_trial).collect();
+        End { blocks: Vec::new(), judgement, elites: elites.to_vec() }
+    }
+
+    /// Whether an end has a judgement of these genotypes.
+    pub(crate) fn fits(&self, end: &End) -> bool {
+        let len = end.judgement.len() * self.values_per_trial;
+        end.elites.len() == self.elites.len() && end.elites.iter().all(|row| row.len() == len)
     }
 
     /// The champion with its judgement, and the new last link of the digest chain of
-    /// re-evaluations. `trial_fitness[0][t]`: fitness of the genotype in trial t. The champion
-    /// stays without a judgement if the fitness of a trial is not finite.
-    pub fn decide(self, trial_fitness: &[Vec<f64>]) -> (Champion, Digest) {
-        let Self { generation, champion, of_generations, digest } = self;
+    /// re-evaluations. `values`: as for [`end`](Self::end). The champion stays without a judgement
+    /// if the fitness of a trial is not finite.
+    pub fn decide(self, values: &[Vec<f64>]) -> (Champion, Digest) {
+        let end = self.end(values);
+        self.decide_by(&end)
+    }
+
+    /// The same, by an end that [fits](Self::fits).
+    pub(crate) fn decide_by(self, end: &End) -> (Champion, Digest) {
+        let Self { generation, champion, elites, of_generations, digest, .. } = self;
         let genotype = [&champion.genotype[..]].into_iter();
-        let digest = digest.next_champion(of_generations, genotype, trial_fitness);
-        let values = trial_fitness.concat();
+        let judgement = std::slice::from_ref(&end.judgement);
+        let mut digest = digest.next_champion(of_generations, genotype, judgement);
+        if !elites.is_empty() {
+            let genotypes = elites.iter().map(|elite| &elite[..]);
+            digest = digest.next_champion(of_generations, genotypes, &end.elites);
+        }
+        let values = &end.judgement[..];
         let n_trials = values.len() as u32;
-        let judged = finite_mean(&values)
-            .zip(interval(&values))
-            .map(|(mean, (low, high))| Judged { mean, low, high, n_trials, generation });
+        let judged = finite_mean(values).zip(interval(values)).map(|(mean, (low, high))| Judged {
+            mean,
+            low,
+            high,
+            n_trials,
+            generation,
+        });
         (Champion { judged, ..champion }, digest)
     }
 }

@@ -58,6 +58,7 @@ mod lineage;
 mod ranking;
 mod real;
 mod reevaluation;
+mod repertoire;
 mod replay;
 mod setup;
 mod stall;
@@ -70,7 +71,7 @@ use std::{ops::Range, sync::Arc};
 use experiment_file::ExperimentConfig;
 use serde::{Deserialize, Serialize};
 
-pub use algorithms::ALGORITHMS;
+pub use algorithms::{ALGORITHMS, Axis};
 pub use champion::{Champion, ChampionSource, HeldOut, Judged};
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use digest::Digest;
@@ -79,16 +80,19 @@ pub use dynamics::Dynamics;
 pub use experiment_file::Params;
 pub use fork::{Fork, ForkError};
 pub use judgement::Judgement;
-pub use lineage::{Ancestor, Birth, BirthOf, Families, GeneSource, Operator, Parents, Pedigree};
+pub use lineage::{
+    Ancestor, Birth, BirthOf, Families, GeneSource, Operator, Parent, Parents, Pedigree,
+};
 pub use real::{NotANumber, Real};
 pub use reevaluation::Reevaluation;
+pub use repertoire::{Corrected, EliteReport, JudgedElite, Repertoire};
 pub use replay::{Outcome, Replay, Round};
 pub use setup::{Setup, SetupError};
 pub use stall::{Drifted, FLAT_COUNTED_MAX, Learnt};
 pub use statistics::{Statistics, between, deviation, finite_mean};
-pub use told::{End, Told};
+pub use told::{End, Evaluations, Told};
 
-use algorithms::{Algorithm, Sample, Strategy as _};
+use algorithms::{Algorithm, Lesson, Sample};
 use distribution::stream_of;
 use stall::FlatGenerations;
 
@@ -180,10 +184,11 @@ impl Evolution {
     /// of experiment files refuses such a file.
     pub fn new(config: &ExperimentConfig, segments: &[Range<usize>], simulation: &str) -> Self {
         let algorithm = &config.algorithm;
+        let axes: Vec<Axis> = algorithm.descriptors.iter().map(Axis::from).collect();
         let populations = algorithm.populations.values().zip(segments);
         let populations = populations
             .map(|(population, segment)| {
-                Algorithm::new(&algorithm.name, &population.params, segment.len())
+                Algorithm::new(&algorithm.name, &population.params, segment.len(), &axes)
                     .expect("the reader knows the algorithm")
             })
             .collect();
@@ -272,9 +277,9 @@ impl Evolution {
         Generation { index: self.n_generations, genotypes, samples }
     }
 
-    /// Learns from a generation that [`ask`](Self::ask) drew. `trial_fitness[i][t]`: fitness of
-    /// individual i in trial t; its mean over t is the individual's fitness, and larger is
-    /// better.
+    /// Learns from a generation that [`ask`](Self::ask) drew. `fitness[i][t]` of the evaluations:
+    /// fitness of individual i in trial t; its mean over t is the individual's fitness, and larger
+    /// is better. A repertoire also learns from the descriptors.
     ///
     /// # Errors
     ///
@@ -282,16 +287,24 @@ impl Evolution {
     ///
     /// # Panics
     ///
-    /// If `generation` is not the next one, or if `trial_fitness` does not have one row per
-    /// individual.
-    pub fn tell(
+    /// If `generation` is not the next one, or if the evaluations do not have one row per
+    /// individual, with [`n_descriptors`](Self::n_descriptors) descriptors per trial.
+    pub fn tell<'a>(
         &mut self,
         generation: Generation,
-        trial_fitness: &[Vec<f64>],
+        evaluations: impl Into<Evaluations<'a>>,
     ) -> Result<GenerationSummary, EvolutionError> {
         let Generation { index, genotypes, samples } = generation;
+        let told = evaluations.into();
+        let Evaluations { fitness: trial_fitness, descriptors } = told;
         assert_eq!(index, self.n_generations, "generations are told in order");
         assert_eq!(genotypes.len(), trial_fitness.len(), "one fitness per individual");
+        let n_described = if self.n_descriptors() == 0 { 0 } else { genotypes.len() };
+        assert_eq!(
+            n_described,
+            descriptors.len(),
+            "descriptors for repertoires, and only for them"
+        );
         let fitness = means(trial_fitness);
         let ranking = ranking::ranking(&fitness);
         let best = ranking[0];
@@ -300,7 +313,8 @@ impl Evolution {
         }
 
         for (population, sample) in self.populations.iter_mut().zip(&samples) {
-            population.learn(sample, &ranking, &fitness);
+            let (ranking, fitness) = (&ranking[..], &fitness[..]);
+            population.learn(&Lesson { generation: index, sample, ranking, fitness, told });
         }
         let best_before = self.challenger.as_ref().and_then(Champion::fitness);
         if best_before.is_none_or(|best_before| fitness[best] > best_before) {
@@ -316,7 +330,7 @@ impl Evolution {
                 self.champion.clone_from(&self.challenger);
             }
         }
-        self.digest = self.digest.next(index, &genotypes, trial_fitness);
+        self.digest = self.digest.next(index, &genotypes, told);
         self.n_generations += 1;
         let statistics = Statistics::from_fitness(&fitness);
         let n_non_finite = fitness.iter().filter(|value| !value.is_finite()).count();
@@ -358,12 +372,19 @@ impl Evolution {
         self.champion_digest = digest;
     }
 
-    /// The present champion, to judge on trials that select nothing; `None` before the first
-    /// generation. The judgement does not change evolution.
+    /// The present champion and the elites of a repertoire, to judge on trials that select nothing;
+    /// `None` before the first generation. The judgement does not change evolution.
     pub fn judgement(&self) -> Option<Judgement> {
         let generation = self.n_generations.checked_sub(1)?;
         let champion = self.champion.clone()?;
-        Some(Judgement::new(generation, champion, self.digest, self.champion_digest))
+        let judgement = Judgement::new(generation, champion, self.digest, self.champion_digest);
+        Some(match self.behaviours() {
+            Some(repertoire) => {
+                let elites = repertoire.elites().into_iter().map(|elite| elite.genotype.clone());
+                judgement.with_elites(elites.collect(), self.n_descriptors())
+            }
+            None => judgement,
+        })
     }
 }
 

@@ -1,5 +1,5 @@
-//! Lineages: the ancestors of an individual of a genetic algorithm, and the survival of their
-//! genes.
+//! Lineages: the ancestors of an individual of a genetic algorithm or of a repertoire, and the
+//! survival of their genes.
 //!
 //! Lineages are not stored: redrawing a generation from the state before it gives the parents of
 //! each child, and the genes that the child has from each.
@@ -7,9 +7,9 @@
 use std::collections::BTreeMap;
 
 use super::{Evolution, Genotype, Told, distribution::stream_of, mean, ranking::ranking};
-use crate::algorithms::Strategy as _;
 
-/// The parents of an individual, by rank in the previous generation, 0 for the best.
+/// The parents of an individual: in genetic algorithms by rank in the previous generation, 0 for the
+/// best; in repertoires by generation and index of their own birth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parents {
     /// No parents, in the first generation.
@@ -20,6 +20,10 @@ pub enum Parents {
     One(usize),
     /// Two crossed parents.
     Two(usize, usize),
+    /// This elite, evaluated again.
+    Again((u64, u32)),
+    /// A point near the line through two elites, closest to the first.
+    Line((u64, u32), (u64, u32)),
 }
 
 /// The origin of a gene.
@@ -43,17 +47,9 @@ pub struct Birth {
 }
 
 impl Birth {
-    /// The birth of an individual with these genes; `parent`: returns the genes of a rank.
-    pub(crate) fn new<'a>(
-        parents: Parents,
-        genes: &[f64],
-        parent: impl Fn(usize) -> &'a Genotype,
-    ) -> Self {
-        let (first, second) = match parents {
-            Parents::None => (None, None),
-            Parents::Elite(rank) | Parents::One(rank) => (Some(parent(rank)), None),
-            Parents::Two(a, b) => (Some(parent(a)), Some(parent(b))),
-        };
+    /// The birth of an individual with these genes; `of_parents`: the genes of each parent.
+    pub(crate) fn new(parents: Parents, genes: &[f64], of_parents: &[&Genotype]) -> Self {
+        let [first, second] = [0, 1].map(|nth| of_parents.get(nth).copied());
         let has = |of: Option<&Genotype>, j: usize| {
             of.is_some_and(|of| of[j].to_bits() == genes[j].to_bits())
         };
@@ -81,15 +77,26 @@ pub struct Ancestor {
     pub n_surviving: usize,
 }
 
-/// A birth, with parents by their index in the previous generation.
+/// A birth, with parents by their indices.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BirthOf {
     /// The operator.
     pub operator: Operator,
-    /// Each parent's index, and the number of genes from it.
-    pub parents: Vec<(u32, usize)>,
+    /// Each parent.
+    pub parents: Vec<Parent>,
     /// Number of genes that mutated or blend both parents.
     pub n_new: usize,
+}
+
+/// A parent, and what a child has from it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Parent {
+    /// Its generation: the previous one, or that of its birth in a repertoire.
+    pub generation: u64,
+    /// Its index in that generation.
+    pub individual: u32,
+    /// Number of genes that the child has from it.
+    pub n_genes: usize,
 }
 
 /// The operator that made a genotype.
@@ -103,6 +110,8 @@ pub enum Operator {
     Copy,
     /// Two parents crossed, then mutated.
     Crossover,
+    /// A point drawn near the line through two elites.
+    Line,
 }
 
 /// The children of a generation, and their parents.
@@ -135,13 +144,18 @@ impl Evolution {
         births.collect()
     }
 
-    /// The families of the next generation; `None` where [`births`](Self::births) is `None`.
+    /// The families of the next generation; `None` unless all parents are of the latest one.
     /// `before`, `told`: the fitness of the latest and of the next generation.
     pub fn families(&self, before: &Told, told: &Told) -> Option<Families> {
+        if self.behaviours().is_some() {
+            return None;
+        }
+        let latest = self.n_generations.saturating_sub(1);
         let parents = mean_fitness(before);
         let individual_of = ranked(&parents);
         let by_index = |births: Vec<Birth>| {
-            births.iter().map(|birth| birth_of(birth, parents_of(birth, &individual_of))).collect()
+            let parents = |birth: &Birth| parents_of(birth, latest, &individual_of);
+            births.iter().map(|birth| birth_of(birth, parents(birth))).collect()
         };
         let births = self.births()?.into_iter().map(by_index).collect();
         Some(Families { parents, children: mean_fitness(told), births })
@@ -163,41 +177,42 @@ impl Pedigree {
     /// later generations first.
     pub fn trace(&self, individual: u32) -> Vec<Ancestor> {
         let mut ancestors = Vec::new();
-        // The genes that are still traced, per individual.
-        let mut traced: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        // The genes that are still traced, per individual of each generation.
+        let mut traced: BTreeMap<u64, BTreeMap<u32, Vec<usize>>> = BTreeMap::new();
+        if let Some((births, _)) = self.generations.last() {
+            let birth = births.get(individual as usize);
+            let genes = (0..birth.map_or(0, |birth| birth.sources.len())).collect();
+            let latest = self.first + self.generations.len() as u64 - 1;
+            traced.entry(latest).or_default().insert(individual, genes);
+        }
         for (place, (births, fitness)) in self.generations.iter().enumerate().rev() {
-            if traced.is_empty() {
-                let n_genes =
-                    births.get(individual as usize).map_or(0, |birth| birth.sources.len());
-                traced.insert(individual, (0..n_genes).collect());
-            }
-            let mut before: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+            let generation = self.first + place as u64;
             let individual_of = match place.checked_sub(1) {
                 Some(earlier) => ranked(&self.generations[earlier].1),
                 None => Vec::new(),
             };
-            for (&individual, genes) in &traced {
+            for (individual, genes) in traced.remove(&generation).unwrap_or_default() {
                 let birth = (place > 0 || self.first == 0)
                     .then(|| births.get(individual as usize))
                     .flatten();
                 let birth = birth.map(|birth| {
-                    let parents = parents_of(birth, &individual_of);
-                    for (nth, &(parent, _)) in parents.iter().enumerate() {
+                    let parents = parents_of(birth, generation.saturating_sub(1), &individual_of);
+                    for (nth, parent) in parents.iter().enumerate() {
                         let source = [GeneSource::First, GeneSource::Second][nth];
                         let kept = genes.iter().filter(|&&j| birth.sources[j] == source);
-                        before.entry(parent).or_default().extend(kept);
+                        let before = traced.entry(parent.generation).or_default();
+                        before.entry(parent.individual).or_default().extend(kept);
                     }
                     birth_of(birth, parents)
                 });
                 ancestors.push(Ancestor {
-                    generation: self.first + place as u64,
+                    generation,
                     individual,
                     fitness: fitness[individual as usize],
                     birth,
                     n_surviving: genes.len(),
                 });
             }
-            traced = before;
         }
         ancestors
     }
@@ -214,23 +229,36 @@ fn ranked(fitness: &[f64]) -> Vec<u32> {
     finite.map(|i| i as u32).collect()
 }
 
-fn parents_of(birth: &Birth, individual_of: &[u32]) -> Vec<(u32, usize)> {
+/// `latest`: the generation of parents that are named by rank.
+fn parents_of(birth: &Birth, latest: u64, individual_of: &[u32]) -> Vec<Parent> {
     let n_from =
         |source| birth.sources.iter().filter(|&&gene_source| gene_source == source).count();
-    let first = |rank: usize| (individual_of[rank], n_from(GeneSource::First));
-    match birth.parents {
+    let sources = [GeneSource::First, GeneSource::Second];
+    let ranks = |ranks: &[usize]| ranks.iter().map(|&rank| (latest, individual_of[rank])).collect();
+    let born: Vec<(u64, u32)> = match birth.parents {
         Parents::None => Vec::new(),
-        Parents::Elite(rank) | Parents::One(rank) => vec![first(rank)],
-        Parents::Two(a, b) => vec![first(a), (individual_of[b], n_from(GeneSource::Second))],
-    }
+        Parents::Elite(rank) | Parents::One(rank) => ranks(&[rank]),
+        Parents::Two(a, b) => ranks(&[a, b]),
+        Parents::Again(elite) => vec![elite],
+        // An elite may be drawn twice.
+        Parents::Line(a, b) if a == b => vec![a],
+        Parents::Line(a, b) => vec![a, b],
+    };
+    let parent = |((generation, individual), source)| Parent {
+        generation,
+        individual,
+        n_genes: n_from(source),
+    };
+    born.into_iter().zip(sources).map(parent).collect()
 }
 
-fn birth_of(birth: &Birth, parents: Vec<(u32, usize)>) -> BirthOf {
+fn birth_of(birth: &Birth, parents: Vec<Parent>) -> BirthOf {
     let operator = match birth.parents {
         Parents::None => Operator::First,
-        Parents::Elite(_) => Operator::Elite,
+        Parents::Elite(_) | Parents::Again(_) => Operator::Elite,
         Parents::One(_) => Operator::Copy,
         Parents::Two(..) => Operator::Crossover,
+        Parents::Line(..) => Operator::Line,
     };
     let n_new = birth.sources.iter().filter(|&&source| source == GeneSource::New).count();
     BirthOf { operator, parents, n_new }

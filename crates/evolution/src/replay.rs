@@ -1,5 +1,7 @@
 //! Repeats recorded generations, with their evaluations and results.
 
+use std::borrow::Cow;
+
 use determinism::random::TrialSet;
 
 use super::{
@@ -22,8 +24,10 @@ pub struct Round<'a> {
     pub trial_set: TrialSet,
     /// The genotypes.
     pub genotypes: Population,
-    /// The recorded fitness of each genotype in every trial; shape `[genotype][trial]`.
-    pub trial_fitness: &'a [Vec<f64>],
+    /// The recorded numbers of each genotype, for each trial its fitness and then its descriptors.
+    pub values: Cow<'a, [Vec<f64>]>,
+    /// Numbers per trial: 1 without descriptors.
+    pub values_per_trial: usize,
 }
 
 /// The result of a run after its latest generation.
@@ -47,15 +51,20 @@ impl Evolution {
     pub fn replay<'a>(&mut self, told: &'a Told) -> Result<Replay<'a>, CheckpointError> {
         let generation = self.ask();
         let misfit = CheckpointError::Misfit { generation: generation.index };
-        if told.trial_fitness.len() != generation.genotypes.len() {
+        let n_descriptors = self.n_descriptors();
+        if !told.has_shape(generation.genotypes.len(), n_descriptors) {
             return Err(misfit);
         }
         let mut rounds = vec![Round {
             trial_set: TrialSet::Generation(generation.index),
             genotypes: generation.genotypes.clone(),
-            trial_fitness: &told.trial_fitness,
+            values: match n_descriptors {
+                0 => (&told.trial_fitness[..]).into(),
+                _ => told.values().into(),
+            },
+            values_per_trial: 1 + n_descriptors,
         }];
-        let summary = self.tell(generation, &told.trial_fitness)?;
+        let summary = self.tell(generation, told)?;
         if !told.blocks.is_empty() {
             let reevaluation = self.repeat(&told.blocks, &mut rounds).ok_or(misfit)?;
             self.set_champion(&reevaluation);
@@ -80,17 +89,30 @@ impl Evolution {
             last.set_champion(&reevaluation);
         }
         let digest = if has_blocks { last.champion_digest() } else { last.digest() };
-        let judged = &told.end.judgement;
-        if judged.is_empty() {
+        if told.end.judgement.is_empty() {
+            if !told.end.elites.is_empty() {
+                return Err(misfit());
+            }
             return Ok(Outcome { champion: last.champion().cloned(), digest, rounds });
         }
         let judgement = last.judgement().ok_or_else(misfit)?;
-        rounds.push(Round {
+        if !judgement.fits(&told.end) {
+            return Err(misfit());
+        }
+        let round = |genotypes, values, values_per_trial| Round {
             trial_set: judgement.trial_set(),
-            genotypes: judgement.genotypes(),
-            trial_fitness: std::slice::from_ref(judged),
-        });
-        let (champion, digest) = judgement.decide(std::slice::from_ref(judged));
+            genotypes,
+            values,
+            values_per_trial,
+        };
+        let genotypes = judgement.genotypes();
+        let (champion, elites) = genotypes.split_at(1);
+        rounds.push(round(champion.into(), vec![told.end.judgement.clone()].into(), 1));
+        if !elites.is_empty() {
+            let values = (&told.end.elites[..]).into();
+            rounds.push(round(elites.into(), values, judgement.values_per_trial()));
+        }
+        let (champion, digest) = judgement.decide_by(&told.end);
         Ok(Outcome { champion: Some(champion), digest, rounds })
     }
 
@@ -107,7 +129,8 @@ impl Evolution {
                 return None;
             }
             let trial_set = reevaluation.trial_set();
-            rounds.push(Round { trial_set, genotypes, trial_fitness: block });
+            let values = block[..].into();
+            rounds.push(Round { trial_set, genotypes, values, values_per_trial: 1 });
             reevaluation.learn(block);
         }
         reevaluation.is_over().then_some(reevaluation)

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use experiment_file::{AlgorithmDescription, Params};
+use experiment_file::{AlgorithmDescription, LearnsFrom, Params};
 
-use super::{ALGORITHMS, Algorithm, Digest, Evolution};
+use super::{ALGORITHMS, Algorithm, Axis, Digest, Evolution};
 
 /// The algorithm and the shape of an evolution.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +19,8 @@ pub struct Setup {
     pub population_size: u32,
     /// Seed of all random draws.
     pub seed: u64,
+    /// The grid of descriptors, for algorithms that evolve a repertoire.
+    pub axes: Vec<Axis>,
 }
 
 /// All mistakes of a [`Setup`], one sentence each; never empty. The caller has to change the
@@ -39,6 +41,7 @@ impl Setup {
             n_genes,
             population_size: 20,
             seed: 0,
+            axes: Vec::new(),
         }
     }
 
@@ -59,7 +62,7 @@ impl Setup {
     /// As [`check`](Self::check).
     pub fn start(&self) -> Result<Evolution, SetupError> {
         self.check()?;
-        let algorithm = Algorithm::new(&self.algorithm, &self.params, self.n_genes);
+        let algorithm = Algorithm::new(&self.algorithm, &self.params, self.n_genes, &self.axes);
         let population = algorithm.expect("the algorithm is known");
         let size = self.population_size as usize;
         Ok(Evolution::from_parts(self.seed, size, vec![population], Digest::of_text(&self.text())))
@@ -85,6 +88,14 @@ impl Setup {
             let name = algorithm.name;
             problems.push(format!("{name} needs at least {min} individuals, not {size}"));
         }
+        let needs_axes = algorithm.learns_from == LearnsFrom::Descriptors;
+        if needs_axes == self.axes.is_empty() {
+            let name = algorithm.name;
+            problems.push(match needs_axes {
+                true => format!("{name} needs descriptors: run an experiment file that has them"),
+                false => format!("{name} knows no descriptors"),
+            });
+        }
         for parameter in algorithm.parameters {
             let value = self.params.get(parameter);
             if let Some(value) = value.filter(|value| !parameter.domain.contains(value, size)) {
@@ -100,10 +111,13 @@ impl Setup {
 
     /// The whole setup as text, for the digest.
     fn text(&self) -> String {
-        let Self { algorithm, params, n_genes, population_size, seed } = self;
+        let Self { algorithm, params, n_genes, population_size, seed, axes } = self;
         let mut text = format!("{algorithm}\n{n_genes}\n{population_size}\n{seed}\n");
         for (key, value) in params.iter() {
             text += &format!("{key} {value}\n");
+        }
+        for Axis { low, high, n_cells } in axes {
+            text += &format!("axis {low} {high} {n_cells}\n");
         }
         text
     }
@@ -119,6 +133,7 @@ impl fmt::Display for SetupError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::by_fitness;
 
     fn problems(setup: &Setup) -> Vec<String> {
         setup.start().unwrap_err().problems
@@ -126,7 +141,7 @@ mod tests {
 
     #[test]
     fn every_algorithm_starts_with_its_defaults() {
-        for algorithm in ALGORITHMS {
+        for algorithm in by_fitness() {
             let evolution = Setup::new(algorithm.name, 3).start().unwrap();
             assert_eq!(evolution.ask().genotypes.len(), 20, "{}", algorithm.name);
         }

@@ -4,10 +4,7 @@
 //! This module changes no bit of a run. It writes notices, and ends a run that continues by chance
 //! alone.
 
-use super::{
-    Evolution, EvolutionError, Generation, GenerationSummary, Told, algorithms::Strategy as _,
-    means,
-};
+use super::{Evaluations, Evolution, EvolutionError, Generation, GenerationSummary, Told, means};
 
 /// The number of latest generations in which all individuals had equal fitness. The number is not
 /// part of the state, so comparisons ignore it. A restored state counts again from the fitness log.
@@ -110,14 +107,14 @@ impl Evolution {
     ///
     /// As [`tell`](Self::tell), and if the run should end because evolution can no longer learn
     /// anything. After an error, the evolution cannot be used.
-    pub fn learn(
+    pub fn learn<'a>(
         &mut self,
         generation: Generation,
-        trial_fitness: &[Vec<f64>],
+        evaluations: impl Into<Evaluations<'a>>,
         completion: impl FnOnce(&GenerationSummary) -> Option<String>,
     ) -> Result<Learnt, EvolutionError> {
         let widest_before = self.widest();
-        let summary = self.tell(generation, trial_fitness)?;
+        let summary = self.tell(generation, evaluations)?;
         if let Some(drifted) = self.drifted(&summary) {
             return Err(drifted.into());
         }
@@ -150,7 +147,9 @@ impl Evolution {
         let mut remarks = Vec::new();
         let n_flat = summary.n_flat;
         let is_due = n_flat >= FLAT_MIN && n_flat.to_string().trim_end_matches('0') == "1";
-        if is_due || (is_last && n_flat > 1) {
+        // A repertoire also learns from behaviours.
+        let needs_fitness = self.behaviours().is_none();
+        if needs_fitness && (is_due || (is_last && n_flat > 1)) {
             remarks.push(self.flat(summary));
         }
         let (Some(was), Some(is)) = (widest_before, self.widest()) else { return remarks };

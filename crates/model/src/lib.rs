@@ -38,4 +38,4 @@ pub mod text;
 #[cfg(feature = "database")]
 pub mod wire;
 
-pub use address::{Address, NotAnAddress, Who};
+pub use address::{Address, Cell, NotAnAddress, Who};

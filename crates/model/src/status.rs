@@ -29,6 +29,8 @@ impl From<QueryError> for Status {
             QueryError::NotFound(_) => Self::not_found(text),
             QueryError::NoIndividual { .. }
             | QueryError::NoMean { .. }
+            | QueryError::NoRepertoire { .. }
+            | QueryError::EmptyCell { .. }
             | QueryError::NoLineage(_) => Self::invalid_argument(text),
             QueryError::NoChampion(_)
             | QueryError::NotEnded(_)

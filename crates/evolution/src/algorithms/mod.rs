@@ -1,17 +1,20 @@
 //! The evolutionary algorithms, behind one interface: draw a generation, learn from its fitness.
 //!
-//! An algorithm is one file, which implements [`Strategy`] and [`Described`], and one row of the
-//! registry below. Its names, parameters and limits in experiment files, in their JSON Schema,
+//! An algorithm is one file and one row of the registry below. The file of an algorithm that learns
+//! from fitness implements [`Strategy`] and [`Described`]. The file of an algorithm that evolves a
+//! repertoire of different behaviours implements [`Rule`]. Its names, parameters and limits in experiment files, in their JSON Schema,
 //! in `docs/keys.md` and in `docs/algorithms.md` follow from its description.
 
 mod cma_es;
 mod cumulation;
 mod ga;
 mod linalg;
+mod map_elites;
 mod openai_es;
 mod pairs;
 mod parameters;
 mod pgpe;
+mod repertoire;
 mod sep_cma_es;
 mod snes;
 mod xnes;
@@ -22,27 +25,52 @@ use determinism::random::Stream;
 use experiment_file::{AlgorithmDescription, Keeps, Params};
 use serde::{Deserialize, Serialize};
 
-use super::{Birth, Genotype, Population};
-/// Declares the algorithms: the state of each, its description, its start.
+use super::{Birth, Evaluations, Genotype, Population};
+pub use repertoire::{Axis, Behaviours};
+use repertoire::{Repertoire, Rule};
+
+/// What depends on the kind of an algorithm: a strategy, or a rule of a repertoire.
+macro_rules! kind {
+    (state: $state:ty) => { $state };
+    (state: $rule:ty, $repertoire:ident) => { $repertoire<$rule> };
+    (description: $state:ty) => { <$state as Described>::DESCRIPTION };
+    (description: $rule:ty, $repertoire:ident) => { <$rule as Rule>::DESCRIPTION };
+    (start: $params:ident, $d:ident, $axes:ident) => { Described::start($params, $d) };
+    (start: $params:ident, $d:ident, $axes:ident, $repertoire:ident) => {
+        $repertoire::start($params, $d, $axes)
+    };
+    (name: $state:ident) => { Kind::Strategy($state) };
+    (name: $state:ident, $repertoire:ident) => { Kind::$repertoire($state) };
+    (learn: $state:ident, $lesson:ident) => {
+        $state.learn($lesson.sample, $lesson.ranking, $lesson.fitness)
+    };
+    (learn: $state:ident, $lesson:ident, $repertoire:ident) => {
+        $state.learn($lesson.generation, $lesson.sample, $lesson.told)
+    };
+}
+
+/// Declares the algorithms: the state of each, its description, its start. Those `in Repertoire`
+/// learn from fitness and descriptors, all others from fitness.
 macro_rules! registry {
-    ($($(#[$doc:meta])* $module:ident::$name:ident,)*) => {
-        /// The algorithms, each with its state. A variant's name is part of the
-        /// format of keyframes.
+    ($($(#[$doc:meta])* $module:ident::$name:ident $(in $repertoire:ident)?,)*) => {
+        /// The algorithms, each with its state. A variant's place is part of the format of
+        /// keyframes.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub enum Algorithm {
-            $($(#[$doc])* $name($module::$name),)*
+            $($(#[$doc])* $name(kind!(state: $module::$name $(, $repertoire)?)),)*
         }
 
         /// The descriptions of all algorithms, for the reader of experiment files.
         pub static ALGORITHMS: &[AlgorithmDescription] =
-            &[$(<$module::$name as Described>::DESCRIPTION,)*];
+            &[$(kind!(description: $module::$name $(, $repertoire)?),)*];
 
         impl Algorithm {
             /// The algorithm of this name before its first generation; `None` if no algorithm has
-            /// this name. `d`: number of genes of the population, at least 1.
-            pub fn new(name: &str, params: &Params, d: usize) -> Option<Self> {
-                $(if name == <$module::$name as Described>::DESCRIPTION.name {
-                    return Some(Self::$name(Described::start(params, d)));
+            /// this name. `d`: number of genes of the population, at least 1. `axes`: the grid of
+            /// descriptors, for algorithms that learn from them.
+            pub fn new(name: &str, params: &Params, d: usize, axes: &[Axis]) -> Option<Self> {
+                $(if name == kind!(description: $module::$name $(, $repertoire)?).name {
+                    return Some(Self::$name(kind!(start: params, d, axes $(, $repertoire)?)));
                 })*
                 None
             }
@@ -50,23 +78,42 @@ macro_rules! registry {
             /// The largest part of its state between generations.
             pub fn keeps(&self) -> Keeps {
                 match self {
-                    $(Self::$name(_) => <$module::$name as Described>::DESCRIPTION.keeps,)*
+                    $(Self::$name(_) => {
+                        kind!(description: $module::$name $(, $repertoire)?).keeps
+                    })*
                 }
             }
 
-            fn strategy(&self) -> &dyn Strategy {
+            /// Learns from a generation that [`sample`](Self::sample) drew from this state.
+            pub fn learn(&mut self, lesson: &Lesson<'_>) {
                 match self {
-                    $(Self::$name(strategy) => strategy,)*
+                    $(Self::$name(state) => kind!(learn: state, lesson $(, $repertoire)?),)*
                 }
             }
 
-            fn strategy_mut(&mut self) -> &mut dyn Strategy {
+            fn kind(&self) -> Kind<'_> {
                 match self {
-                    $(Self::$name(strategy) => strategy,)*
+                    $(Self::$name(state) => kind!(name: state $(, $repertoire)?),)*
                 }
             }
         }
     };
+}
+
+/// An evaluated generation.
+#[derive(Debug, Clone, Copy)]
+pub struct Lesson<'a> {
+    /// Its index.
+    pub generation: u64,
+    /// Its draws.
+    pub sample: &'a Sample,
+    /// Indices of the individuals, best first, those without finite fitness last (see
+    /// [`ranking`](super::ranking::ranking)).
+    pub ranking: &'a [usize],
+    /// Mean fitness of each individual; at least one is finite.
+    pub fitness: &'a [f64],
+    /// Its trials.
+    pub told: Evaluations<'a>,
 }
 
 registry! {
@@ -84,6 +131,14 @@ registry! {
     openai_es::OpenAiEs,
     /// Policy gradients with ClipUp.
     pgpe::Pgpe,
+    /// The best of every cell of a grid.
+    map_elites::MapElites in Repertoire,
+}
+
+/// An algorithm by what it learns from.
+enum Kind<'a> {
+    Strategy(&'a dyn Strategy),
+    Repertoire(&'a dyn Behaviours),
 }
 
 /// The draws of an algorithm for one generation.
@@ -169,45 +224,69 @@ pub trait Described: Strategy {
 }
 
 impl Algorithm {
+    /// Number of genes of an individual.
+    pub fn n_genes(&self) -> usize {
+        match self.kind() {
+            Kind::Strategy(strategy) => strategy.n_genes(),
+            Kind::Repertoire(repertoire) => repertoire.n_genes(),
+        }
+    }
+
     /// The mean of its distribution as a genotype, if it has one.
     pub fn mean(&self) -> Option<Genotype> {
-        let mean = self.strategy().mean()?;
+        let mean = self.strategy()?.mean()?;
         Some(mean.iter().map(|&gene| mirror(gene)).collect())
     }
-}
 
-impl Strategy for Algorithm {
-    fn n_genes(&self) -> usize {
-        self.strategy().n_genes()
+    /// See [`Strategy::deviations`].
+    pub fn deviations(&self) -> Option<Vec<f64>> {
+        self.strategy()?.deviations()
     }
 
-    fn deviations(&self) -> Option<Vec<f64>> {
-        self.strategy().deviations()
+    /// Draws `population_size` individuals. A pure function of the state and the stream.
+    pub fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
+        match self.kind() {
+            Kind::Strategy(strategy) => strategy.sample(population_size, rng),
+            Kind::Repertoire(repertoire) => repertoire.sample(population_size, rng),
+        }
     }
 
-    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        self.strategy().sample(population_size, rng)
+    /// See [`Strategy::draws_one_by_one`].
+    pub fn draws_one_by_one(&self) -> bool {
+        self.strategy().is_some_and(Strategy::draws_one_by_one)
     }
 
-    fn draws_one_by_one(&self) -> bool {
-        self.strategy().draws_one_by_one()
-    }
-
-    fn individual(
+    /// See [`Strategy::individual`].
+    pub fn individual(
         &self,
         index: usize,
         population_size: usize,
         rng: &mut Stream,
     ) -> Option<Genotype> {
-        self.strategy().individual(index, population_size, rng)
+        self.strategy()?.individual(index, population_size, rng)
     }
 
-    fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
-        self.strategy().births(population_size, rng)
+    /// See [`Strategy::births`].
+    pub fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
+        match self.kind() {
+            Kind::Strategy(strategy) => strategy.births(population_size, rng),
+            Kind::Repertoire(repertoire) => Some(repertoire.births(population_size, rng)),
+        }
     }
 
-    fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {
-        self.strategy_mut().learn(sample, ranking, fitness);
+    /// Its repertoire, if it has one.
+    pub fn repertoire(&self) -> Option<&dyn Behaviours> {
+        match self.kind() {
+            Kind::Strategy(_) => None,
+            Kind::Repertoire(repertoire) => Some(repertoire),
+        }
+    }
+
+    fn strategy(&self) -> Option<&dyn Strategy> {
+        match self.kind() {
+            Kind::Strategy(strategy) => Some(strategy),
+            Kind::Repertoire(_) => None,
+        }
     }
 }
 

@@ -48,7 +48,7 @@ fn started(name: &str, population_size: u32) -> Evolution {
 
 #[test]
 fn no_fitness_makes_an_algorithm_panic_or_leave_the_range_of_genes() {
-    for algorithm in ALGORITHMS {
+    for algorithm in by_fitness() {
         for (what, fitness) in ADVERSARIES {
             let mut evolution = started(algorithm.name, 5);
             for generation in 0..N_GENERATIONS {
@@ -108,7 +108,7 @@ fn remarks(
 
 #[test]
 fn equal_fitness_gives_a_notice_after_ten_generations_and_then_ever_more_rarely() {
-    for algorithm in ALGORITHMS {
+    for algorithm in by_fitness() {
         let (remarks, _) = remarks(&mut started(algorithm.name, 100), 10, flat);
         let expected = "generations 0 to 9: all 100 individuals have the same fitness 0.25, ";
         assert_eq!(remarks.len(), 1, "{remarks:?}");
@@ -123,7 +123,7 @@ fn equal_fitness_gives_a_notice_after_ten_generations_and_then_ever_more_rarely(
 
 #[test]
 fn fitness_that_differs_gives_no_notice() {
-    for algorithm in ALGORITHMS {
+    for algorithm in by_fitness() {
         let (remarks, drifted) = remarks(&mut started(algorithm.name, 20), 30, sphere);
         assert_eq!((remarks, drifted), (vec![], None), "{}", algorithm.name);
     }
@@ -190,7 +190,7 @@ fn only_populations_too_small_to_learn_from_give_a_warning() {
     for name in ["SNES", "xNES", "GA"] {
         assert!(advice(name, 1).unwrap().contains("never learns"), "{name}");
     }
-    for algorithm in ALGORITHMS {
+    for algorithm in by_fitness() {
         assert!(advice(algorithm.name, 3).unwrap().contains("next to nothing"));
         assert_eq!(advice(algorithm.name, 4), None);
         assert_eq!(

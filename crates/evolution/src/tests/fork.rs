@@ -29,7 +29,7 @@ fn forked(parent: &ExperimentConfig, child: &ExperimentConfig) -> Result<Evoluti
 
 #[test]
 fn a_fork_that_changes_nothing_has_the_digests_of_its_parent() {
-    for algorithm in ALGORITHMS {
+    for algorithm in by_fitness() {
         let parent = parent(algorithm.name);
         let mut child = parent.clone();
         child.name = "another name".to_owned();

@@ -1,7 +1,7 @@
 //! Lineages: children have the genes of the parents that a lineage names.
 
 use super::*;
-use crate::{Operator, Pedigree, Setup};
+use crate::{Operator, Parent, Pedigree, Setup};
 
 const D: usize = 12;
 
@@ -44,15 +44,16 @@ fn genes_come_from_the_named_parents() {
             for ancestor in &lineage {
                 let genes = &genotypes[ancestor.generation as usize][ancestor.individual as usize];
                 let birth = ancestor.birth.as_ref().unwrap();
-                let n_kept: usize = birth.parents.iter().map(|(_, n)| n).sum();
+                let n_kept: usize = birth.parents.iter().map(|parent| parent.n_genes).sum();
                 assert_eq!(n_kept + birth.n_new, D, "{crossover}: {ancestor:?}");
-                for &(parent, n) in &birth.parents {
-                    let of = &genotypes[ancestor.generation as usize - 1][parent as usize];
+                for &Parent { generation, individual, n_genes: n } in &birth.parents {
+                    assert_eq!(generation, ancestor.generation - 1);
+                    let of = &genotypes[generation as usize][individual as usize];
                     let n_same = genes.iter().zip(of).filter(|(a, b)| a == b).count();
                     assert!(n_same >= n, "{crossover}: {ancestor:?}");
                 }
                 if birth.operator == Operator::Elite {
-                    assert_eq!(birth.parents[0].1, D);
+                    assert_eq!(birth.parents[0].n_genes, D);
                 }
                 let focal = &genotypes[5][individual as usize];
                 let n_same = focal.iter().zip(genes).filter(|(a, b)| a == b).count();
@@ -85,10 +86,11 @@ fn families_have_parents_of_the_pedigree_with_fitness_of_parent_and_child() {
                 let traced = &pedigree.trace(i as u32)[0];
                 assert_eq!(traced.birth.as_ref(), Some(birth));
                 assert_eq!(traced.fitness.to_bits(), families.children[i].to_bits());
-                for &(parent, _) in &birth.parents {
-                    let trials = &before.trial_fitness[parent as usize];
+                for parent in &birth.parents {
+                    let trials = &before.trial_fitness[parent.individual as usize];
                     let mean = (trials[0] + trials[1]) / 2.0;
-                    assert_eq!(families.parents[parent as usize].to_bits(), mean.to_bits());
+                    let found = families.parents[parent.individual as usize];
+                    assert_eq!(found.to_bits(), mean.to_bits());
                 }
             }
         }

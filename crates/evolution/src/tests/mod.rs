@@ -8,19 +8,26 @@ mod golden;
 mod honesty;
 mod lineage;
 mod reference;
+mod repertoire;
 mod suite;
 
 use experiment_file::{
     AlgorithmConfig, AlgorithmDescription, Boundary, Domain, FitnessFunction, InitialRates,
-    NamedMap, NeuronModel, Params, PopulationConfig, SynapseModel, TopologyConfig, WorldConfig,
+    LearnsFrom, NamedMap, NeuronModel, Params, PopulationConfig, SynapseModel, TopologyConfig,
+    WorldConfig,
 };
 
 use super::*;
 
+/// The algorithms that learn from fitness alone.
+pub(crate) fn by_fitness() -> impl Iterator<Item = &'static AlgorithmDescription> {
+    ALGORITHMS.iter().filter(|algorithm| algorithm.learns_from != LearnsFrom::Descriptors)
+}
+
 /// An evolution by SNES.
 fn evolution(population_size: usize, segment_lens: &[usize]) -> Evolution {
     let params = Params::default();
-    let algorithm = |&d: &usize| Algorithm::new("SNES", &params, d).unwrap();
+    let algorithm = |&d: &usize| Algorithm::new("SNES", &params, d, &[]).unwrap();
     evolution_of(segment_lens.iter().map(algorithm).collect(), population_size)
 }
 
@@ -240,6 +247,7 @@ fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentC
             decoding: NamedMap::new(),
         },
         algorithm: AlgorithmConfig {
+            descriptors: Vec::new(),
             name: name.to_owned(),
             evolvable_object: "robot".to_owned(),
             population_size,
@@ -373,7 +381,7 @@ fn invalid_checkpoints_are_errors() {
     assert!(matches!(restore(b"{}", &[]), Err(CheckpointError::Version { found: b'{', .. })));
     assert!(matches!(restore(&keyframe[..9], &[]), Err(CheckpointError::Malformed(_))));
     assert!(matches!(restore(&keyframe, &[&entry[..9]]), Err(CheckpointError::Malformed(_))));
-    assert!(matches!(restore(&keyframe, &[&[3]]), Err(CheckpointError::Version { found: 3, .. })));
+    assert!(matches!(restore(&keyframe, &[&[9]]), Err(CheckpointError::Version { found: 9, .. })));
     // Entries with two individuals, and without finite fitness.
     let misfit = restore(&keyframe, &[&[1, 2, 0, 0, 0]]);
     assert!(matches!(misfit, Err(CheckpointError::Misfit { generation: 0 })), "{misfit:?}");
@@ -385,7 +393,7 @@ fn invalid_checkpoints_are_errors() {
 #[test]
 fn keyframes_are_as_far_apart_as_time_and_room_allow() {
     let interval = |algorithm: &str, population_size: usize, d: usize, n_trials: usize| {
-        let population = Algorithm::new(algorithm, &Params::default(), d).unwrap();
+        let population = Algorithm::new(algorithm, &Params::default(), d, &[]).unwrap();
         let mut evolution = evolution_of(vec![population], population_size);
         let entry_len = population_size * (1 + 8 * n_trials);
         let is_due = |evolution: &Evolution| evolution.is_keyframe_due(entry_len);

@@ -5,7 +5,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::super::{
-    algorithms::{Algorithm, Sample, Strategy as _},
+    Evaluations,
+    algorithms::{Algorithm, Lesson, Sample},
     ranking::ranking,
 };
 
@@ -57,7 +58,14 @@ fn assert_follows(fixture: &str, tolerance: f64) {
             Algorithm::SepCmaEs(sep_cma_es) => sep_cma_es.sample_of(&generation.points),
             _ => Sample::new(Vec::new(), generation.normals),
         };
-        algorithm.learn(&sample, &ranking(&generation.fitness), &generation.fitness);
+        let fitness = &generation.fitness[..];
+        algorithm.learn(&Lesson {
+            generation: g as u64,
+            sample: &sample,
+            ranking: &ranking(fitness),
+            fitness,
+            told: Evaluations { fitness: &[], descriptors: &[] },
+        });
         let state = serde_json::to_value(&algorithm).unwrap();
         assert_close(&state, &generation.after, tolerance, &format!("generation {g}: "));
     }

@@ -52,7 +52,7 @@ pub fn genetic_algorithms(has_selection: impl Fn(&str) -> bool) -> Vec<Variant> 
 
 /// Every algorithm with its defaults, the genetic one with all its operators.
 fn all() -> Vec<Variant> {
-    let others = ALGORITHMS.iter().map(|algorithm| algorithm.name).filter(|name| *name != "GA");
+    let others = by_fitness().map(|algorithm| algorithm.name).filter(|name| *name != "GA");
     others.map(|name| (name, params(&[]))).chain(genetic_algorithms(|_| true)).collect()
 }
 
@@ -61,7 +61,7 @@ pub fn start(
     segment_lens: &[usize],
     population_size: usize,
 ) -> Evolution {
-    let algorithm = |&d: &usize| Algorithm::new(name, params, d).unwrap();
+    let algorithm = |&d: &usize| Algorithm::new(name, params, d, &[]).unwrap();
     evolution_of(segment_lens.iter().map(algorithm).collect(), population_size)
 }
 
@@ -117,7 +117,7 @@ fn every_generation_comes_back_from_every_keyframe_before_it() {
         let (states, log) = recorded(&variant);
         n_blocks_max = log.iter().map(|told| told.blocks.len()).fold(n_blocks_max, usize::max);
         // Evaluations at the end of a run are stored, and do not change evolution.
-        let end = End { blocks: vec![vec![vec![7.0]]], judgement: vec![8.0] };
+        let end = End { blocks: vec![vec![vec![7.0]]], judgement: vec![8.0], ..End::default() };
         let bytes = |told: &Told| Told { end: end.clone(), ..told.clone() }.to_bytes();
         let log: Vec<Vec<u8>> = log.iter().map(bytes).collect();
         for (g, state) in states.iter().enumerate() {

@@ -30,6 +30,7 @@ macro_rules! reading_calls {
                 get_champion(GetChampionRequest) -> GetChampionResponse;
                 get_individuals(GetIndividualsRequest) -> GetIndividualsResponse;
                 get_lineage(GetLineageRequest) -> GetLineageResponse;
+                get_repertoire(GetRepertoireRequest) -> GetRepertoireResponse;
                 list_dynamics(ListDynamicsRequest) -> ListDynamicsResponse;
             }
             $($rest)*

@@ -113,7 +113,14 @@ impl StoredFamilies {
             let told = told(entry)?;
             if of.generation % every == 0 {
                 let families = evolution.families(&before, &told);
-                let families = families.ok_or_else(|| no_parents(&experiment, &config))?;
+                let families = families.ok_or_else(|| match evolution.n_descriptors() {
+                    0 => no_parents(&experiment, &config),
+                    _ => QueryError::NoLineage(format!(
+                        "the parents in experiment {0} are elites of many generations; `swarmctl \
+                         lineage {0}@{1}/0` shows them",
+                        experiment.id, of.generation
+                    )),
+                })?;
                 n_children += families.births.iter().map(Vec::len).sum::<usize>();
                 generations.push((of.generation, families));
             }

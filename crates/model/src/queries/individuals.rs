@@ -41,7 +41,7 @@ impl Reader {
     ) -> Result<GetIndividualsResponse, Status> {
         let GetIndividualsRequest { address: text, from_individual, page_size, fitness_only } =
             request;
-        let address = address(&text)?;
+        let address = self.resolve(address(&text)?).await?;
         let page = Several { first: from_individual, len: page_size, fitness_only };
         let read = move |store: &_| StoredIndividuals::read(store, address, page);
         self.reconstruct(read, StoredIndividuals::reconstruct).await
@@ -92,6 +92,9 @@ impl StoredIndividuals {
             Who::Generation(generation) => (generation, Wanted::Page(page)),
             Who::Individual(generation, individual) => (generation, Wanted::Individual(individual)),
             Who::Mean(generation) => (generation, Wanted::Mean),
+            Who::Cell(generation, cell) => {
+                return Err(QueryError::EmptyCell { experiment: id, generation, cell });
+            }
         };
         Ok(Self::OfGeneration(StoredGeneration::read(store, id, generation)?, wanted))
     }

@@ -21,7 +21,8 @@ impl Reader {
         &self,
         request: GetLineageRequest,
     ) -> Result<GetLineageResponse, Status> {
-        let (address, depth) = (address(&request.address)?, request.depth);
+        let address = self.resolve(address(&request.address)?).await?;
+        let depth = request.depth;
         let read = move |store: &_| StoredLineage::read(store, address, depth);
         self.reconstruct(read, StoredLineage::trace).await
     }
@@ -126,6 +127,7 @@ fn ancestor(ancestor: Ancestor) -> v1::Ancestor {
             Some(Operator::Elite) => BirthOperator::Elite,
             Some(Operator::Copy) => BirthOperator::Copy,
             Some(Operator::Crossover) => BirthOperator::Crossover,
+            Some(Operator::Line) => BirthOperator::Line,
         }
         .into(),
         genes: ancestor.n_surviving as u32,
@@ -134,7 +136,12 @@ fn ancestor(ancestor: Ancestor) -> v1::Ancestor {
             .birth
             .into_iter()
             .flat_map(|birth| birth.parents)
-            .map(|(individual, genes)| GenesOfParent { individual, genes: genes as u32 })
+            .map(|parent| GenesOfParent {
+                individual: parent.individual,
+                genes: parent.n_genes as u32,
+                generation: Some(parent.generation)
+                    .filter(|generation| generation + 1 != ancestor.generation),
+            })
             .collect(),
     }
 }

@@ -12,11 +12,12 @@ mod generation;
 mod individuals;
 mod lineage;
 mod reader;
+mod repertoire;
 
 use tonic::Status;
 
 use crate::{
-    Address, NotAnAddress,
+    Address, Cell, NotAnAddress,
     ids::ExperimentId,
     store::{Store, StoreError, StoredExperiment},
 };
@@ -98,6 +99,29 @@ pub enum QueryError {
     NoMean {
         /// The experiment.
         experiment: ExperimentId,
+    },
+    /// The algorithm evolves no repertoire.
+    #[error(
+        "experiment {experiment} has no repertoire: {algorithm} evolves none; MAP-Elites and DNS do"
+    )]
+    NoRepertoire {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// Its algorithm.
+        algorithm: String,
+    },
+    /// A cell of a repertoire has no elite.
+    #[error(
+        "{cell} has no elite after generation {generation} of experiment {experiment}; `swarmctl \
+         repertoire {experiment}` lists those that have one"
+    )]
+    EmptyCell {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// The generation.
+        generation: u64,
+        /// The cell.
+        cell: Cell,
     },
     /// The individual has no lineage, or its lineage is too large.
     #[error("{0}")]

@@ -139,8 +139,9 @@ pub fn children(page: &Families) -> Value {
                     json!(operator(birth.operator)),
                     json!(families.children[individual]),
                 ];
-                row.extend(birth.parents.iter().flat_map(|&(parent, _)| {
-                    [json!(parent), json!(families.parents[parent as usize])]
+                row.extend(birth.parents.iter().flat_map(|parent| {
+                    let individual = parent.individual;
+                    [json!(individual), json!(families.parents[individual as usize])]
                 }));
                 rows.push(Value::Array(row));
             }
@@ -156,6 +157,7 @@ fn operator(operator: Operator) -> &'static str {
         Operator::Elite => "elite",
         Operator::Copy => "copy",
         Operator::Crossover => "crossover",
+        Operator::Line => "line",
     }
 }
 

@@ -201,8 +201,11 @@ fn generations_of_different_sizes_share_a_map() {
 #[test]
 fn children_are_beside_their_parents() {
     let birth = |operator, parents| evolution::BirthOf { operator, parents, n_new: 1 };
-    let births =
-        vec![birth(Operator::Crossover, vec![(1, 2), (0, 3)]), birth(Operator::Copy, vec![(1, 5)])];
+    let of = |individual, n_genes| evolution::Parent { generation: 3, individual, n_genes };
+    let births = vec![
+        birth(Operator::Crossover, vec![of(1, 2), of(0, 3)]),
+        birth(Operator::Copy, vec![of(1, 5)]),
+    ];
     let children = vec![0.5, f64::NAN];
     let of = evolution::Families { parents: vec![0.25, 1.5], children, births: vec![births] };
     let page = Families { populations: vec!["p".into()], generations: vec![(4, of)], next: 5 };

@@ -146,8 +146,16 @@ impl Strategy for Ga {
 
     fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
         let drawn = self.draw(population_size, rng).into_iter();
-        let parent = |rank: usize| &self.ranked[rank];
-        Some(drawn.map(|(genes, parents)| Birth::new(parents, &genes, parent)).collect())
+        let birth = |(genes, parents): (Genotype, Parents)| {
+            let ranks = match parents {
+                Parents::Elite(rank) | Parents::One(rank) => vec![rank],
+                Parents::Two(a, b) => vec![a, b],
+                _ => Vec::new(),
+            };
+            let of_parents: Vec<&Genotype> = ranks.iter().map(|&rank| &self.ranked[rank]).collect();
+            Birth::new(parents, &genes, &of_parents)
+        };
+        Some(drawn.map(birth).collect())
     }
 
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {

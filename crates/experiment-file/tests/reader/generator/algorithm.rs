@@ -7,7 +7,16 @@ use super::world::Robot;
 use super::{Dice, insert, object};
 
 pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Value {
-    let name = dice.pick(&["GA", "SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES", "PGPE"]);
+    let name = dice.pick(&[
+        "GA",
+        "SNES",
+        "xNES",
+        "CMA-ES",
+        "sep-CMA-ES",
+        "openaiES",
+        "PGPE",
+        "MAP-Elites",
+    ]);
     let mut tasks = vec!["grouping"];
     if network.has_led {
         tasks.extend(["identify_leader", "identify_borderline"]);
@@ -22,12 +31,14 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
     // Coefficients of learning are too many genes for algorithms with a full matrix.
     let learns = queries.iter().any(|(query, _)| query.starts_with("learning:"));
     let name = if learns && ["xNES", "CMA-ES"].contains(&name) { "sep-CMA-ES" } else { name };
-    let n_populations = dice.die(queries.len().min(3));
+    let has_repertoire = ["MAP-Elites"].contains(&name);
+    let n_populations = if has_repertoire { 1 } else { dice.die(queries.len().min(3)) };
     let mut populations = json!({});
     for i in 0..n_populations {
         let queries: Vec<_> = queries.iter().skip(i).step_by(n_populations).collect();
         insert(&mut populations, &format!("p{i}"), population(dice, name, &queries));
     }
+    let task = dice.pick(&tasks);
     let target = dice.number(0.0, 2.0);
     let mut algorithm = object(dice, [("target_fitness", target)]);
     for (key, value) in [
@@ -37,12 +48,37 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
         ("generations", json!(dice.die(1000))),
         ("evaluation_steps", json!(100 + dice.die(500))),
         ("num_evaluations", json!(dice.die(5))),
-        ("fitness_function", json!(dice.pick(&tasks))),
+        ("fitness_function", json!(task)),
         ("populations", populations),
     ] {
         insert(&mut algorithm, key, value);
     }
+    if has_repertoire {
+        insert(&mut algorithm, "descriptors", descriptors(dice, task));
+    }
     algorithm
+}
+
+fn descriptors(dice: &mut Dice, task: &str) -> Value {
+    let measures = match task {
+        "identify_leader" => ["leaders", "one_leader"],
+        "identify_borderline" => ["accuracy", "precision"],
+        "goto_light" => ["light_distance_others", "near_light_others"],
+        "grouping" => ["center_distance"; 2],
+        _ => ["misalignment", "turning"],
+    };
+    let mut descriptor = |measure: &str| {
+        let summary = json!(dice.pick(&["mean", "end"]));
+        let [low, width] = [dice.number(-9.0, 9.0), dice.number(0.1, 9.0)];
+        let high = low.as_f64().unwrap() + width.as_f64().unwrap();
+        let cells = json!(dice.die(20));
+        let mut descriptor = object(dice, [("of", summary), ("cells", cells)]);
+        insert(&mut descriptor, "measure", json!(measure));
+        insert(&mut descriptor, "range", json!([low, high]));
+        descriptor
+    };
+    let [first, second] = measures.map(&mut descriptor);
+    if measures[0] != measures[1] && dice.chance(0.5) { json!([first, second]) } else { first }
 }
 
 fn population(dice: &mut Dice, algorithm: &str, queries: &[&(String, [f64; 2])]) -> Value {
@@ -100,6 +136,15 @@ fn params(dice: &mut Dice, algorithm: &str) -> Value {
                 ],
             )
         }
+        "MAP-Elites" => object(
+            dice,
+            [
+                ("reevaluated", json!(0.5)),
+                ("iso_sigma", sigma),
+                ("line_sigma", decay),
+                ("depth", json!(3)),
+            ],
+        ),
         "SNES" => object(
             dice,
             [

@@ -1,0 +1,61 @@
+//! MAP-Elites: the best individual of every cell of a grid of behaviours.
+//!
+//! Mouret, Clune: "Illuminating search spaces by mapping elites", arXiv 1504.04909 (2015). A cell
+//! keeps a few individuals in depth (Flageat, Cully: "Fast and stable MAP-Elites in noisy domains
+//! using Deep-Grid", ALIFE 2020): a lucky newcomer does not drive out the former elite, which
+//! returns once evidence shows the luck.
+
+use std::cmp::Ordering;
+
+use experiment_file::{AlgorithmDescription, DEPTH, Keeps, LearnsFrom, Params, limits};
+use serde::{Deserialize, Serialize};
+
+use super::repertoire::{Evidence, ISO_SIGMA, LINE_SIGMA, REEVALUATED, Rule};
+
+/// The best of every cell survive.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MapElites {
+    /// Number of individuals that a cell keeps.
+    depth: usize,
+}
+
+impl Rule for MapElites {
+    const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
+        name: "MAP-Elites",
+        title: "Multi-dimensional archive of phenotypic elites",
+        learns: "elites of each cell",
+        state: "elites d",
+        keeps: Keeps::Repertoire,
+        individuals_min: 2,
+        learns_from: LearnsFrom::Descriptors,
+        genes_max: None,
+        parameters: &[REEVALUATED, ISO_SIGMA, LINE_SIGMA, DEPTH],
+    };
+
+    fn start(params: &Params, n_cells: usize) -> Self {
+        let depth = params.value_of::<u32>(&DEPTH) as usize;
+        Self { depth: depth.min(limits::ELITES as usize / n_cells).max(1) }
+    }
+
+    fn survivors(&self, pool: &[Evidence]) -> Vec<usize> {
+        best_of_cells(pool, self.depth)
+    }
+
+    fn elites(&self, survivors: &[Evidence]) -> Vec<usize> {
+        best_of_cells(survivors, 1)
+    }
+}
+
+/// The `n` fittest of every cell, the first of equals, in ascending order of their places.
+fn best_of_cells(pool: &[Evidence], n: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..pool.len()).collect();
+    order.sort_by(|&a, &b| {
+        let (a, b) = (&pool[a], &pool[b]);
+        let by_fitness = b.fitness.partial_cmp(&a.fitness).unwrap_or(Ordering::Equal);
+        a.cell.cmp(&b.cell).then(by_fitness)
+    });
+    let cells = order.chunk_by(|&a, &b| pool[a].cell == pool[b].cell);
+    let mut best: Vec<usize> = cells.flat_map(|cell| cell.iter().copied().take(n)).collect();
+    best.sort_unstable();
+    best
+}
