@@ -81,6 +81,11 @@ fn map_elites(bencher: Bencher, n_genes: usize) {
     repertoire(bencher, "MAP-Elites", n_genes);
 }
 
+#[divan::bench(args = [12, 100, 455], sample_count = 20)]
+fn dns(bencher: Bencher, n_genes: usize) {
+    repertoire(bencher, "DNS", n_genes);
+}
+
 /// As [`generation`], after enough generations to fill the grid.
 fn repertoire(bencher: Bencher, algorithm: &str, n_genes: usize) {
     const SIZE: u32 = 1000;

@@ -7,6 +7,7 @@
 
 mod cma_es;
 mod cumulation;
+mod dns;
 mod ga;
 mod linalg;
 mod map_elites;
@@ -133,6 +134,8 @@ registry! {
     pgpe::Pgpe,
     /// The best of every cell of a grid.
     map_elites::MapElites in Repertoire,
+    /// Those far from all that are fitter.
+    dns::Dns in Repertoire,
 }
 
 /// An algorithm by what it learns from.

@@ -57,7 +57,12 @@ fn map_elites_keeps_the_archive_of_the_package_ribs() {
     assert_follows(include_str!("../../tests/fixtures/map_elites.json"));
 }
 
-const NAMES: [&str; 1] = ["MAP-Elites"];
+#[test]
+fn dns_keeps_the_survivors_of_its_paper() {
+    assert_follows(include_str!("../../tests/fixtures/dns.json"));
+}
+
+const NAMES: [&str; 2] = ["MAP-Elites", "DNS"];
 
 fn axes() -> Vec<Axis> {
     vec![Axis { low: 0.0, high: 1.0, n_cells: 4 }, Axis { low: -1.0, high: 1.0, n_cells: 3 }]
@@ -121,7 +126,7 @@ fn checkpoints_and_logs_restore_a_repertoire_to_the_same_bits() {
 #[test]
 fn every_bit_of_every_descriptor_enters_the_digest() {
     let digest = |change: fn(&mut f64)| {
-        let mut evolution = started("MAP-Elites", Params::default());
+        let mut evolution = started("DNS", Params::default());
         let mut told = described(&evolution.ask().genotypes);
         change(&mut told.descriptors[7][3]);
         evolution.replay(&told).unwrap();

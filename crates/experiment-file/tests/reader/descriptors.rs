@@ -19,8 +19,7 @@ const ORDER: &str = r#"{"measure": "order", "of": "end", "range": [-1, 1], "cell
 
 #[test]
 fn a_descriptor_needs_no_list_and_has_defaults() {
-    let of_one =
-        accept(&with("MAP-Elites", r#""descriptors": {"measure": "order", "range": [0, 2]},"#));
+    let of_one = accept(&with("DNS", r#""descriptors": {"measure": "order", "range": [0, 2]},"#));
     let expected = DescriptorConfig {
         measure: "order".to_owned(),
         summarises: Summarises::Mean,
@@ -56,11 +55,11 @@ fn descriptors_and_algorithm_belong_together() {
 
 #[test]
 fn a_repertoire_has_a_single_population() {
-    let named = format!(r#""name": "MAP-Elites", "descriptors": {ORDER},"#);
+    let named = format!(r#""name": "DNS", "descriptors": {ORDER},"#);
     let problem = refuse(&edited(r#""name": "GA","#, &named));
     assert!(
         problem.contains(
-            "algorithm.populations: MAP-Elites evolves a single population, not 2, because an elite is a \
+            "algorithm.populations: DNS evolves a single population, not 2, because an elite is a \
              whole robot; move all `objects` into one population"
         ),
         "{problem}"
@@ -70,11 +69,11 @@ fn a_repertoire_has_a_single_population() {
 #[test]
 fn ranges_grids_and_costs_are_checked_together() {
     let twice = ORDER.replace("[-1, 1]", "[1, 1]");
-    let problems = refuse(&with("MAP-Elites", &format!(r#""descriptors": [{twice}, {ORDER}],"#)));
+    let problems = refuse(&with("DNS", &format!(r#""descriptors": [{twice}, {ORDER}],"#)));
     assert!(problems.contains("descriptors[0].range: ends at 1, not above its beginning 1"));
     assert!(problems.contains("descriptors[1].measure: `order` is a descriptor already"));
     let other = ORDER.replace("order", "speed").replace("32", "513");
-    let problem = refuse(&with("MAP-Elites", &format!(r#""descriptors": [{ORDER}, {other}],"#)));
+    let problem = refuse(&with("DNS", &format!(r#""descriptors": [{ORDER}, {other}],"#)));
     assert!(problem.contains("the grid has 16416 cells, the limit is 16384"), "{problem}");
     let fine = ORDER.replace("32", "16384");
     let long = with("MAP-Elites", &format!(r#""judgement_trials": 1000, "descriptors": {fine},"#));

@@ -16,6 +16,7 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
         "openaiES",
         "PGPE",
         "MAP-Elites",
+        "DNS",
     ]);
     let mut tasks = vec!["grouping"];
     if network.has_led {
@@ -31,7 +32,7 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
     // Coefficients of learning are too many genes for algorithms with a full matrix.
     let learns = queries.iter().any(|(query, _)| query.starts_with("learning:"));
     let name = if learns && ["xNES", "CMA-ES"].contains(&name) { "sep-CMA-ES" } else { name };
-    let has_repertoire = ["MAP-Elites"].contains(&name);
+    let has_repertoire = ["MAP-Elites", "DNS"].contains(&name);
     let n_populations = if has_repertoire { 1 } else { dice.die(queries.len().min(3)) };
     let mut populations = json!({});
     for i in 0..n_populations {
@@ -145,6 +146,9 @@ fn params(dice: &mut Dice, algorithm: &str) -> Value {
                 ("depth", json!(3)),
             ],
         ),
+        "DNS" => {
+            object(dice, [("reevaluated", json!(0)), ("elites", json!(100)), ("nearest", json!(5))])
+        }
         "SNES" => object(
             dice,
             [
