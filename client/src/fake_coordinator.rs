@@ -1,6 +1,7 @@
 //! A coordinator for tests that follows a script.
 
 mod fleet;
+mod repertoires;
 
 use std::{
     collections::VecDeque,
@@ -17,16 +18,16 @@ use swarm_proto::v1::{
     ExportExperimentResponse, ExtendExperimentRequest, ExtendExperimentResponse,
     GenerationDynamics, GenerationSummary, GenesOfParent, GetChampionRequest, GetChampionResponse,
     GetExperimentRequest, GetExperimentResponse, GetIndividualsRequest, GetIndividualsResponse,
-    GetLineageRequest, GetLineageResponse, ImportExperimentRequest, ImportExperimentResponse,
-    LabelExperimentRequest, LabelExperimentResponse, ListDynamicsRequest, ListDynamicsResponse,
-    ListEventsRequest, ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse,
-    ListGenerationsRequest, ListGenerationsResponse, PauseExperimentRequest,
-    PauseExperimentResponse, PopulationLineage, PruneExperimentRequest, PruneExperimentResponse,
-    ResumeExperimentRequest, ResumeExperimentResponse, RetryExperimentRequest,
-    RetryExperimentResponse, SetPriorityRequest, SetPriorityResponse, StateChange,
-    SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
-    WatchExperimentResponse, WatchExplanationRequest, WatchExplanationResponse, WatchNewsRequest,
-    WatchNewsResponse, Worker,
+    GetLineageRequest, GetLineageResponse, GetRepertoireRequest, GetRepertoireResponse,
+    ImportExperimentRequest, ImportExperimentResponse, LabelExperimentRequest,
+    LabelExperimentResponse, ListDynamicsRequest, ListDynamicsResponse, ListEventsRequest,
+    ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse, ListGenerationsRequest,
+    ListGenerationsResponse, PauseExperimentRequest, PauseExperimentResponse, PopulationLineage,
+    PruneExperimentRequest, PruneExperimentResponse, ResumeExperimentRequest,
+    ResumeExperimentResponse, RetryExperimentRequest, RetryExperimentResponse, SetPriorityRequest,
+    SetPriorityResponse, StateChange, SubmitExperimentRequest, SubmitExperimentResponse,
+    WatchExperimentRequest, WatchExperimentResponse, WatchExplanationRequest,
+    WatchExplanationResponse, WatchNewsRequest, WatchNewsResponse, Worker,
     event::Kind,
     experiment_service_server::{ExperimentService, ExperimentServiceServer},
     fleet_service_server::FleetServiceServer,
@@ -253,7 +254,7 @@ impl ExperimentService for FakeCoordinator {
             genes,
             ..Ancestor::default()
         };
-        let parent = |individual, genes| GenesOfParent { individual, genes };
+        let parent = |individual, genes| GenesOfParent { individual, genes, generation: None };
         let ancestors = vec![
             Ancestor {
                 operator: BirthOperator::Crossover.into(),
@@ -276,6 +277,13 @@ impl ExperimentService for FakeCoordinator {
         ];
         let lineage = PopulationLineage { population: "p1".into(), ancestors };
         Ok(Response::new(GetLineageResponse { populations: vec![lineage] }))
+    }
+
+    async fn get_repertoire(
+        &self,
+        request: Request<GetRepertoireRequest>,
+    ) -> Result<Response<GetRepertoireResponse>, Status> {
+        Ok(Response::new(repertoires::repertoire(request.into_inner().generation)))
     }
 
     type ExportExperimentStream =

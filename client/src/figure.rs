@@ -1,9 +1,11 @@
-//! Figures: curves with a band around each, as SVG or PNG. The same curves give the
-//! same bytes on every machine: the font is part of the program.
+//! Figures: curves with a band around each, and heat maps, as SVG or PNG. The same data give
+//! the same bytes on every machine: the font is part of the program.
 
 mod draw;
+mod heat_map;
 
-pub use draw::{FONT, embed_font};
+pub use draw::{Drawing, FONT, embed_font};
+pub use heat_map::{HeatMap, MapAxis};
 
 use std::path::Path;
 
@@ -76,17 +78,6 @@ impl Format {
                 format!("{}: a figure's name ends in .svg or .png", path.display()),
             )),
         }
-    }
-}
-
-impl Figure {
-    /// Writes the figure in the format that the extension of the file's name selects.
-    pub fn write(&self, path: &Path, overwrite: Overwrite) -> Result<(), Error> {
-        let bytes = match Format::of_path(path)? {
-            Format::Svg => self.to_svg()?.into_bytes(),
-            Format::Png => self.to_png()?,
-        };
-        overwrite.write(path, &bytes)
     }
 }
 

@@ -3,7 +3,8 @@
 use model::{Address, Who};
 use swarm_proto::v1::{
     Experiment, GetChampionResponse, GetExperimentRequest, GetIndividualsRequest,
-    GetIndividualsResponse, GetLineageRequest, GetLineageResponse,
+    GetIndividualsResponse, GetLineageRequest, GetLineageResponse, GetRepertoireRequest,
+    GetRepertoireResponse,
 };
 
 use crate::{
@@ -53,6 +54,16 @@ impl Connection {
         answer.map_err(|error| error.about(address))
     }
 
+    /// The repertoire after a generation, by default the latest one.
+    pub async fn repertoire(
+        &self,
+        experiment_id: u64,
+        generation: Option<u64>,
+    ) -> Result<GetRepertoireResponse, Error> {
+        let request = GetRepertoireRequest { experiment_id, generation };
+        self.call(async |client| client.get_repertoire(request).await).await
+    }
+
     /// An address with the number of its experiment.
     pub async fn resolve(&self, address: &NamedAddress) -> Result<Address, Error> {
         Ok(address.in_experiment(match &address.experiment {
@@ -87,6 +98,9 @@ pub fn described(address: Address) -> String {
         }
         Who::Mean(generation) => {
             format!("mean of the distribution after generation {generation} of experiment {id}")
+        }
+        Who::Cell(generation, cell) => {
+            format!("elite of {cell} after generation {generation} of experiment {id}")
         }
     }
 }

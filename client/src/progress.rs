@@ -49,7 +49,7 @@ const BAR_WIDTH: usize = 26;
 
 /// The outputs of a command, and the progress bar.
 pub struct Progress {
-    format: OutputFormat,
+    pub format: OutputFormat,
     stdout: Box<dyn Write + Send>,
     /// The reason why standard output is closed, if it is.
     unwritten: Unwritten,

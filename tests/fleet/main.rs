@@ -23,6 +23,7 @@ mod monitoring;
 mod protocol;
 mod python_client;
 mod read_out;
+mod repertoires;
 mod reproduction;
 mod scripts;
 mod security;

@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 
 use super::{
     bench, compare, completions, doctor, evaluate, examples, explain, export, export_controller,
-    fleet, history, lineage, man, new, plot, replay, schema, simulate, validate, verify, web,
-    workers,
+    fleet, history, lineage, man, new, plot, repertoire, replay, schema, simulate, validate,
+    verify, web, workers,
 };
 use crate::{
     consent::Planned,
@@ -148,6 +148,7 @@ const PRINTED: &[Printed] = &[
     document(&["man"], &[part::<man::Written>()]),
     document(&["new"], &[part::<new::Written<'_>>()]),
     document(&["plot"], &[part::<plot::Plotted>(), part::<plot::PlottedSteps<'_>>()]),
+    document(&["repertoire"], &[part::<repertoire::Document>(), part::<repertoire::Mapped>()]),
     document(&["replay"], &[part::<replay::Written>()]),
     document(
         &["schema"],

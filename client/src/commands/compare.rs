@@ -14,7 +14,7 @@ use crate::{
     complete,
     connection::Connection,
     error::{Code, Error},
-    figure::{CURVES_MAX, Curve, Figure, Format, Point},
+    figure::{CURVES_MAX, Curve, Drawing as _, Figure, Format, Point},
     output_file::Overwrite,
     place::Intent,
     progress::Progress,

@@ -21,6 +21,7 @@ family! {
         #[command(visible_alias = "champion")]
         Individual(IndividualArgs),
         Lineage(super::lineage::LineageArgs),
+        Repertoire(super::repertoire::RepertoireArgs),
     }
 }
 
@@ -37,8 +38,9 @@ family! {
 #[command(after_help = HELP)]
 pub struct IndividualArgs {
     /// The genotype: ID or NAME, the champion of an experiment; ID@G/I, individual I of
-    /// generation G; ID@G/mean, the mean of the distribution after generation G; ID@G, all
-    /// individuals of generation G, without their networks.
+    /// generation G; ID@G/mean, the mean of the distribution after generation G; 'ID@G/cell(A,B)',
+    /// an elite of the repertoire after generation G; ID@G, all individuals of generation G,
+    /// without their networks.
     #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments))]
     address: NamedAddress,
 }

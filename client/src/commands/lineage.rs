@@ -70,7 +70,7 @@ struct AncestorDocument {
     fitness: Option<f64>,
     /// The operator that made it; null in the earliest generation of the lineage.
     operator: Option<Operator>,
-    /// Its parents in the generation before.
+    /// Its parents.
     parents: Vec<ParentDocument>,
     /// Number of its genes that mutated or blend both parents.
     new_genes: u32,
@@ -78,7 +78,7 @@ struct AncestorDocument {
     genes: u32,
 }
 
-/// An operator of a genetic algorithm.
+/// An operator of a genetic algorithm or of a repertoire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum Operator {
@@ -90,12 +90,19 @@ enum Operator {
     Copy,
     /// Of two parents, with mutations.
     Crossover,
+    /// Near the line through two elites of a repertoire.
+    Line,
 }
 
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(rename = "Parent")]
 struct ParentDocument {
-    /// Its index in the generation before, from 0.
+    /// The generation of its birth, if it is not the generation before: elites of repertoires live
+    /// long.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "u64")]
+    generation: Option<u64>,
+    /// Its index in its generation, from 0.
     individual: u32,
     /// Number of genes that come from it.
     genes: u32,
@@ -122,6 +129,7 @@ fn operator(ancestor: &Ancestor) -> Option<Operator> {
         BirthOperator::Elite => Some(Operator::Elite),
         BirthOperator::Copy => Some(Operator::Copy),
         BirthOperator::Crossover => Some(Operator::Crossover),
+        BirthOperator::Line => Some(Operator::Line),
     }
 }
 
@@ -135,7 +143,11 @@ impl<'a> LineageDocument<'a> {
             parents: ancestor
                 .parents
                 .iter()
-                .map(|of| ParentDocument { individual: of.individual, genes: of.genes })
+                .map(|of| ParentDocument {
+                    generation: of.generation,
+                    individual: of.individual,
+                    genes: of.genes,
+                })
                 .collect(),
             new_genes: ancestor.new_genes,
             genes: ancestor.genes,

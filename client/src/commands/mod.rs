@@ -29,6 +29,7 @@ mod new;
 mod old_words;
 mod plot;
 mod reordered;
+mod repertoire;
 mod replay;
 mod run;
 pub mod schema;
@@ -115,8 +116,8 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         return Err(Error::at(
             Code::BadArgument,
             "--output",
-            "`--output csv` is for tables: history, list and workers; this command has table, \
-             wide and json",
+            "`--output csv` is for tables: history, list, repertoire and workers; this command \
+             has table, wide and json",
         ));
     }
     if matches!(&command, Command::Remote(command) if command.ends_with_reader()) {

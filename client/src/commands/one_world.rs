@@ -59,6 +59,7 @@ const ASKED: &[&str] = &[
     "individual 3",
     "lineage two@2/3 --depth 1 --dot",
     "lineage 2@2/3 --output json",
+    "repertoire 1",
     "simulate 1 --trials 2 --steps 9",
     "simulate 3",
     "simulate 9@1/3",

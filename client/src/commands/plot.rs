@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::{
     connection::Connection,
     error::{Code, Error},
-    figure::{CURVES_MAX, Curve, Figure, Format, Point},
+    figure::{CURVES_MAX, Curve, Drawing as _, Figure, Format, Point},
     place::Intent,
     progress::Progress,
     recorded::{Run, Source},

@@ -1,6 +1,6 @@
 //! The layout of figures.
 
-use std::{fmt::Display, ops::Range, sync::Once};
+use std::{fmt::Display, ops::Range, path::Path, sync::Once};
 
 use plotters::{
     coord::Shift,
@@ -13,8 +13,8 @@ use plotters::{
     },
 };
 
-use super::{CURVES_MAX, Curve, Figure};
-use crate::error::Error;
+use super::{CURVES_MAX, Curve, Figure, Format};
+use crate::{error::Error, output_file::Overwrite};
 
 /// Pixels of a PNG, and units of an SVG: 20 by 12.5 cm at 300 per inch.
 const SIZE: (u32, u32) = (2400, 1500);
@@ -23,15 +23,15 @@ const UNITS: u32 = 3;
 
 /// A family that SVG viewers know, too.
 pub const FONT: &str = "sans-serif";
-const FONT_SIZE: i32 = 54;
+pub(super) const FONT_SIZE: i32 = 54;
 const TITLE_SIZE: i32 = 66;
 const CAPTION_SIZE: i32 = 46;
 const GREY: RGBColor = RGBColor(90, 90, 90);
 /// Length of the tick marks of an axis, which sets the distance of the numbers.
-const TICK_LENGTH: i32 = 18;
+pub(super) const TICK_LENGTH: i32 = 18;
 const LINE_WIDTH: u32 = 5;
 const BAND_OPACITY: f64 = 0.2;
-const MARGIN: i32 = 36;
+pub(super) const MARGIN: i32 = 36;
 /// Length of a curve's sample in the legend.
 const SAMPLE: i32 = 110;
 const LEGEND_ROW: i32 = 70;
@@ -49,12 +49,16 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(204, 121, 167),
 ];
 
-type Canvas<'a, B> = DrawingArea<B, Shift>;
-type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+pub(super) type Canvas<'a, B> = DrawingArea<B, Shift>;
+pub(super) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
-impl Figure {
-    /// The figure as SVG.
-    pub fn to_svg(&self) -> Result<String, Error> {
+/// Something to draw.
+pub trait Drawing {
+    /// Draws it.
+    fn draw<B: DrawingBackend>(&self, area: &Canvas<'_, B>) -> Drawn<B>;
+
+    /// The drawing as SVG.
+    fn to_svg(&self) -> Result<String, Error> {
         let mut svg = String::new();
         {
             let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
@@ -69,8 +73,8 @@ impl Figure {
         ))
     }
 
-    /// The figure as PNG.
-    pub fn to_png(&self) -> Result<Vec<u8>, Error> {
+    /// The drawing as PNG.
+    fn to_png(&self) -> Result<Vec<u8>, Error> {
         let (width, height) = SIZE;
         let mut pixels = vec![0; 3 * width as usize * height as usize];
         {
@@ -87,11 +91,19 @@ impl Figure {
         Ok(bytes)
     }
 
+    /// Writes the drawing in the format that the extension of the file's name selects.
+    fn write(&self, path: &Path, overwrite: Overwrite) -> Result<(), Error> {
+        let bytes = match Format::of_path(path)? {
+            Format::Svg => self.to_svg()?.into_bytes(),
+            Format::Png => self.to_png()?,
+        };
+        overwrite.write(path, &bytes)
+    }
+}
+
+impl Drawing for Figure {
     fn draw<B: DrawingBackend>(&self, area: &Canvas<'_, B>) -> Drawn<B> {
-        embed_font();
-        area.fill(&WHITE)?;
-        let area = area.margin(MARGIN, MARGIN, MARGIN, MARGIN);
-        let area = self.draw_head(area)?;
+        let area = draw_head(area, &self.title, &self.caption)?;
         let legend = Legend::new(&self.curves, &area)?;
         let (top, plot) = area.split_vertically(legend.n_rows() * LEGEND_ROW);
         legend.draw(&top)?;
@@ -139,29 +151,32 @@ impl Figure {
         }
         area.present()
     }
+}
 
-    /// Draws title and caption; returns the remaining area.
-    fn draw_head<'a, B: DrawingBackend>(
-        &self,
-        area: Canvas<'a, B>,
-    ) -> Result<Canvas<'a, B>, DrawingAreaErrorKind<B::ErrorType>> {
-        let mut rest = area;
-        for (text, size, colour) in
-            [(&self.title, TITLE_SIZE, BLACK), (&self.caption, CAPTION_SIZE, GREY)]
-        {
-            if text.is_empty() {
-                continue;
-            }
-            let height = size * 3 / 2;
-            let (head, below) = rest.split_vertically(height);
-            let anchor = Pos::new(HPos::Left, VPos::Center);
-            let style = TextStyle::from((FONT, size).into_font()).color(&colour).pos(anchor);
-            head.draw(&Text::new(text.as_str(), (MARGIN, height / 2), &style))?;
-            rest = below;
+/// Draws title and caption on a white area; returns the remaining area.
+pub(super) fn draw_head<'a, B: DrawingBackend>(
+    area: &Canvas<'a, B>,
+    title: &str,
+    caption: &str,
+) -> Result<Canvas<'a, B>, DrawingAreaErrorKind<B::ErrorType>> {
+    embed_font();
+    area.fill(&WHITE)?;
+    let mut rest = area.margin(MARGIN, MARGIN, MARGIN, MARGIN);
+    for (text, size, colour) in [(title, TITLE_SIZE, BLACK), (caption, CAPTION_SIZE, GREY)] {
+        if text.is_empty() {
+            continue;
         }
-        Ok(rest)
+        let height = size * 3 / 2;
+        let (head, below) = rest.split_vertically(height);
+        let anchor = Pos::new(HPos::Left, VPos::Center);
+        let style = TextStyle::from((FONT, size).into_font()).color(&colour).pos(anchor);
+        head.draw(&Text::new(text, (MARGIN, height / 2), &style))?;
+        rest = below;
     }
+    Ok(rest)
+}
 
+impl Figure {
     /// The x axis covers all points, the y axis a little more than the bands.
     fn ranges(&self) -> (Range<f64>, Range<f64>) {
         let points = || self.curves.iter().flat_map(|curve| &curve.points);

@@ -2,6 +2,8 @@
 
 use std::{fmt, str::FromStr};
 
+use experiment_file::limits;
+
 use crate::ids::ExperimentId;
 
 /// The address of genotypes of an experiment.
@@ -24,13 +26,45 @@ pub enum Who {
     Individual(u64, u32),
     /// `ID@G/mean`: the mean of the distribution after a generation.
     Mean(u64),
+    /// `ID@G/cell(A,B)`: the elite of a cell of the repertoire after a generation.
+    Cell(u64, Cell),
+}
+
+/// A cell of a grid of descriptors, by its index on every axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cell {
+    indices: [u32; limits::DESCRIPTORS],
+    n_axes: usize,
+}
+
+impl Cell {
+    /// The index on every axis.
+    pub fn indices(&self) -> &[u32] {
+        &self.indices[..self.n_axes]
+    }
+
+    /// The cell of these indices; `None` if there are none, or more than descriptors.
+    pub fn new(indices: &[u32]) -> Option<Self> {
+        let n_axes = indices.len();
+        let mut all = [0; limits::DESCRIPTORS];
+        all.get_mut(..n_axes).filter(|_| n_axes > 0)?.copy_from_slice(indices);
+        Some(Self { indices: all, n_axes })
+    }
+}
+
+impl fmt::Display for Cell {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let indices: Vec<String> = self.indices().iter().map(ToString::to_string).collect();
+        write!(f, "cell({})", indices.join(","))
+    }
 }
 
 /// The error for a text that is not an address.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is not ID (the champion of experiment ID), ID@G (generation G), ID@G/I (its individual \
-     I) or ID@G/mean (the mean of the distribution after it); all are numbers from 0"
+     I), ID@G/mean (the mean of the distribution after it) or 'ID@G/cell(A,B)' (an elite of the \
+     repertoire after it, in quotes); all are numbers from 0"
 )]
 pub struct NotAnAddress(String);
 
@@ -56,6 +90,12 @@ fn parse(text: &str) -> Option<Address> {
         None => Who::Champion,
         Some((generation, None)) => Who::Generation(number(generation)?),
         Some((_, Some((generation, "mean")))) => Who::Mean(number(generation)?),
+        Some((_, Some((generation, cell)))) if cell.starts_with("cell(") => {
+            let indices = cell.strip_prefix("cell(")?.strip_suffix(')')?.split(',');
+            let index = |text: &str| number(text)?.try_into().ok();
+            let indices: Option<Vec<u32>> = indices.map(index).collect();
+            Who::Cell(number(generation)?, Cell::new(&indices?)?)
+        }
         Some((_, Some((generation, individual)))) => {
             Who::Individual(number(generation)?, number(individual)?.try_into().ok()?)
         }
@@ -71,6 +111,7 @@ impl fmt::Display for Address {
             Who::Generation(generation) => write!(f, "@{generation}"),
             Who::Individual(generation, individual) => write!(f, "@{generation}/{individual}"),
             Who::Mean(generation) => write!(f, "@{generation}/mean"),
+            Who::Cell(generation, cell) => write!(f, "@{generation}/{cell}"),
         }
     }
 }
@@ -86,6 +127,8 @@ mod tests {
             ("3@0", Who::Generation(0)),
             ("3@12/7", Who::Individual(12, 7)),
             ("3@12/mean", Who::Mean(12)),
+            ("3@12/cell(3,17)", Who::Cell(12, Cell::new(&[3, 17]).unwrap())),
+            ("3@12/cell(0)", Who::Cell(12, Cell::new(&[0]).unwrap())),
             ("3@18446744073709551615/4294967295", Who::Individual(u64::MAX, u32::MAX)),
         ] {
             let address = Address { experiment: ExperimentId(3), who };
@@ -111,6 +154,12 @@ mod tests {
             "1@1/Mean",
             "1@1/mean/",
             "1@1/2/3",
+            "1@1/cell()",
+            "1@1/cell(1",
+            "1@1/cell(1,)",
+            "1@1/cell(-1)",
+            "1@1/cell(1,2,3,4,5,6,7,8,9)",
+            "1@/cell(1)",
             "1@@1",
             "1/2",
             "1@1/4294967296",

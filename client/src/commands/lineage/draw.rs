@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use swarm_proto::v1::{Ancestor, PopulationLineage};
+use swarm_proto::v1::{Ancestor, GenesOfParent, PopulationLineage};
 
 use super::{Operator, operator};
 use crate::text;
@@ -56,6 +56,12 @@ impl Tree<'_> {
             ),
             Some(Operator::Copy) => format!(", copy with {} new", of.new_genes),
             Some(Operator::Elite) => ", elite".to_owned(),
+            Some(Operator::Line) => {
+                let parents = of.parents.iter().filter_map(|parent| place_of(of, parent));
+                let named: Vec<String> =
+                    parents.map(|(generation, i)| format!("{generation}/{i}")).collect();
+                format!(", near the line through {}", named.join(" and "))
+            }
             Some(Operator::First) => ", first generation".to_owned(),
             None => String::new(),
         };
@@ -73,9 +79,7 @@ impl Tree<'_> {
         let parents: Vec<&Ancestor> = of
             .parents
             .iter()
-            .filter_map(|parent| {
-                self.all.get(&(of.generation.checked_sub(1)?, parent.individual)).copied()
-            })
+            .filter_map(|parent| self.all.get(&place_of(of, parent)?).copied())
             .collect();
         for (i, parent) in parents.iter().enumerate() {
             let (branch, under) = match i + 1 == parents.len() {
@@ -85,6 +89,11 @@ impl Tree<'_> {
             self.grow(parent, format!("{before}{below}"), branch, under);
         }
     }
+}
+
+/// Generation and index of a parent.
+fn place_of(child: &Ancestor, parent: &GenesOfParent) -> Option<(u64, u32)> {
+    Some((parent.generation.or(child.generation.checked_sub(1))?, parent.individual))
 }
 
 /// A graph in Graphviz's language: children point to their parents, with the number of genes.
@@ -105,8 +114,7 @@ pub fn graph(populations: &[PopulationLineage]) -> String {
                 of.genes
             ));
             for parent in &of.parents {
-                let Some(before) = g.checked_sub(1) else { continue };
-                let j = parent.individual;
+                let Some((before, j)) = place_of(of, parent) else { continue };
                 if known.contains(&(before, j)) {
                     let genes = parent.genes;
                     lines.push(format!(

@@ -1,0 +1,129 @@
+//! Reads repertoires: the elites after a generation, recomputed from the fitness log.
+
+use std::collections::BTreeMap;
+
+use evolution::{ALGORITHMS, EliteReport, Repertoire};
+use experiment_file::{DescriptorConfig, ExperimentConfig, ParameterValue};
+use swarm_proto::v1::{
+    self, CorrectedFigures, DescriptorAxis, GetRepertoireRequest, GetRepertoireResponse,
+};
+use tonic::Status;
+
+use crate::{Address, Cell, Who, ids::ExperimentId, store::Store};
+
+use super::{QueryError, Reader, StoredGeneration, experiment, generation::Replayed};
+
+impl Reader {
+    /// The repertoire of an experiment after a generation.
+    pub async fn get_repertoire(
+        &self,
+        request: GetRepertoireRequest,
+    ) -> Result<GetRepertoireResponse, Status> {
+        let GetRepertoireRequest { experiment_id, generation } = request;
+        let id = ExperimentId(experiment_id);
+        let read = move |store: &_| read(store, id, generation);
+        self.reconstruct(read, |stored| message(&stored)).await
+    }
+
+    /// The address with the elite of a cell in place of the cell.
+    pub(super) async fn resolve(&self, address: Address) -> Result<Address, Status> {
+        let Who::Cell(generation, cell) = address.who else { return Ok(address) };
+        let id = address.experiment;
+        let read = move |store: &_| read(store, id, Some(generation));
+        let (generation, individual) =
+            self.reconstruct(read, move |stored| elite_of(&stored, cell)).await?;
+        Ok(Address { who: Who::Individual(generation, individual), ..address })
+    }
+}
+
+fn read(
+    store: &Store,
+    id: ExperimentId,
+    generation: Option<u64>,
+) -> Result<StoredGeneration, QueryError> {
+    let found = experiment(store, id)?;
+    let is_known = ALGORITHMS.iter().any(|algorithm| {
+        algorithm.name == found.summary.algorithm
+            && algorithm.learns_from == experiment_file::LearnsFrom::Descriptors
+    });
+    if !is_known {
+        let algorithm = found.summary.algorithm.clone();
+        return Err(QueryError::NoRepertoire { experiment: id, algorithm });
+    }
+    let latest = found.n_generations().saturating_sub(1);
+    StoredGeneration::read(store, id, generation.unwrap_or(latest))
+}
+
+/// Recomputes a repertoire, and passes it to `then`; CPU-bound.
+fn with_repertoire<T>(
+    stored: &StoredGeneration,
+    then: impl FnOnce(&Repertoire<'_>) -> Result<T, QueryError>,
+) -> Result<T, QueryError> {
+    let Replayed { told, after, .. } = stored.replay()?;
+    let repertoire = after.elites(&told.end).ok_or_else(|| QueryError::NoRepertoire {
+        experiment: stored.experiment.id,
+        algorithm: stored.experiment.summary.algorithm.clone(),
+    })?;
+    then(&repertoire)
+}
+
+/// The birth of the fittest elite in a cell, by evidence.
+fn elite_of(stored: &StoredGeneration, cell: Cell) -> Result<(u64, u32), QueryError> {
+    with_repertoire(stored, |repertoire| {
+        let mut elites = repertoire.by_cell().into_iter();
+        let found = elites.find(|elite| elite.cell == cell.indices());
+        found.map(|elite| (elite.generation, elite.individual)).ok_or(QueryError::EmptyCell {
+            experiment: stored.experiment.id,
+            generation: stored.of.generation,
+            cell,
+        })
+    })
+}
+
+fn message(stored: &StoredGeneration) -> Result<GetRepertoireResponse, QueryError> {
+    let (config, _) = ExperimentConfig::from_json(&stored.experiment.config_json, "", ALGORITHMS)
+        .map_err(|error| QueryError::Undecodable(error.to_string()))?;
+    with_repertoire(stored, |repertoire| {
+        let figures = repertoire.figures();
+        let shown = if figures.is_some() { repertoire.corrected() } else { repertoire.by_cell() };
+        let born = |elite: &EliteReport<'_>| (elite.generation, elite.individual);
+        let places: BTreeMap<(u64, u32), u32> =
+            repertoire.elites.iter().map(born).zip(0..).collect();
+        Ok(GetRepertoireResponse {
+            generation: stored.of.generation,
+            axes: config.algorithm.descriptors.iter().map(axis).collect(),
+            elites: repertoire.elites.iter().map(elite).collect(),
+            shown: shown.into_iter().map(|elite| places[&born(elite)]).collect(),
+            corrected: figures.map(|figures| CorrectedFigures {
+                qd_score: figures.qd_score,
+                coverage: figures.coverage,
+                stay: figures.stay,
+            }),
+        })
+    })
+}
+
+fn axis(descriptor: &DescriptorConfig) -> DescriptorAxis {
+    let DescriptorConfig { measure, summarises, range: [low, high], cells } = descriptor;
+    let of = match ParameterValue::from(*summarises) {
+        ParameterValue::Name(name) => name,
+        _ => String::new(),
+    };
+    DescriptorAxis { measure: measure.clone(), of, low: *low, high: *high, cells: *cells }
+}
+
+fn elite(elite: &EliteReport<'_>) -> v1::Elite {
+    v1::Elite {
+        generation: elite.generation,
+        individual: elite.individual,
+        cell: elite.cell.clone(),
+        fitness: elite.fitness,
+        descriptors: elite.descriptors.clone(),
+        trials: elite.n_trials,
+        judged: elite.judged.as_ref().map(|judged| v1::JudgedElite {
+            fitness: judged.fitness,
+            descriptors: judged.descriptors.clone(),
+            cell: judged.cell.clone(),
+        }),
+    }
+}
