@@ -217,6 +217,42 @@ class RecordedRun:
             next_individual = None if is_last else page.next_individual
         return Individuals(np.array(genotypes), np.array(fitness))
 
+    def repertoire(self, generation: int | None = None) -> pandas.DataFrame:
+        """A row per elite that MAP-Elites or DNS keeps after a generation, by default the latest
+        one. ``shown`` marks the fittest of every cell. Means over the trials of its life are
+        optimistic; those that begin with ``judged_`` are missing before the end of a run. ``attrs``
+        has the axes of the grid, and the corrected figures."""
+        with needs("data"):
+            import pandas
+
+        chosen = {} if generation is None else {"generation": arguments.whole(generation, "generation")}
+        found = self._records._call("GetRepertoire", experiment_id=self.id, **chosen)
+        names = [f"{axis.measure}_{axis.of}" for axis in found.axes]
+        shown = set(found.shown)
+
+        def row(place: int, elite: Any) -> dict[str, Any]:
+            judged = elite.judged if elite.HasField("judged") else None
+            return {
+                "address": f"{self.id}@{elite.generation}/{elite.individual}",
+                "shown": place in shown,
+                "trials": elite.trials,
+                "fitness": elite.fitness,
+                "cell": tuple(elite.cell),
+                **dict(zip(names, elite.descriptors)),
+                "judged_fitness": judged.fitness if judged else np.nan,
+                "judged_cell": tuple(judged.cell) if judged else None,
+                **{f"judged_{name}": judged.descriptors[i] if judged else np.nan for i, name in enumerate(names)},
+            }
+
+        elites = pandas.DataFrame([row(*it) for it in enumerate(found.elites)])
+        elites.attrs["axes"] = {
+            name: {"range": (axis.low, axis.high), "cells": axis.cells} for name, axis in zip(names, found.axes)
+        }
+        if found.HasField("corrected"):
+            of = found.corrected
+            elites.attrs["corrected"] = {"qd_score": of.qd_score, "coverage": of.coverage, "stay": of.stay}
+        return elites
+
     def fitness(self, generation: int) -> Floats:
         """``[P, T]``: the fitness of a generation that evolution used, without its genotypes."""
         generation = arguments.whole(generation, "generation")

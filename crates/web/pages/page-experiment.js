@@ -7,6 +7,7 @@ import { whatItDoes } from "swarm/doing.js";
 import { dynamicsPanel } from "swarm/dynamics.js";
 import { familiesPanel } from "swarm/families.js";
 import { heatMap } from "swarm/heat-map.js";
+import { repertoirePanel } from "swarm/repertoire.js";
 import { askJson, bar, complain, endPage, listen, main, oneByOne, order, remaining, resolve, span, stateMark } from "swarm/page.js";
 
 /** Time between two requests for data that do not come with every generation, ms. */
@@ -35,6 +36,7 @@ const map = heatMap(id, onZoom);
 const championBox = element("section", { className: "panel" });
 const dynamics = dynamicsPanel(id);
 const families = familiesPanel(id);
+const repertoire = repertoirePanel(id);
 const doing = element("section", { className: "panel" });
 const eventList = element("ol", { className: "events", tabIndex: 0, "aria-label": "events, the latest first" });
 const file = element("pre", { className: "file", tabIndex: 0, "aria-label": "experiment file" });
@@ -68,6 +70,7 @@ function drawStanding() {
   const isEmpty = it.generations_done === 0;
   for (const part of results) part.hidden = isEmpty;
   families.hidden = isEmpty || !hasParents;
+  repertoire.hidden = isEmpty;
   const says = NEXT[it.state];
   standing.hidden = !says || (!isEmpty && ["running", "unfinished"].includes(it.state));
   if (standing.hidden) return;
@@ -101,6 +104,7 @@ function draw() {
   spread.show({ xLabel: "generation", yLabel: "standard deviation", lines: [{ name: "standard deviation", color: "var(--line)", points: points(4) }] });
   map.update(it.generations_done);
   dynamics.update(it.generations_done);
+  if (repertoire.isConnected) repertoire.update(it.generations_done, it.state === "completed");
   families.update(it.generations_done, it.generations * it.population_size * n_populations);
 }
 
@@ -198,6 +202,7 @@ async function load() {
   ({ experiment, champion } = answer);
   n_populations = Object.keys(answer.config.algorithm?.populations ?? {}).length || 1;
   hasParents = answer.has_parents;
+  if (answer.has_repertoire && !repertoire.isConnected) results[0].after(repertoire);
   const text = JSON.stringify(answer.config, null, 2);
   if (file.textContent !== text) file.textContent = text;
   draw();

@@ -49,6 +49,7 @@ modules!(
     "page-replay.js",
     "player.js",
     "recording.js",
+    "repertoire.js",
     "replay-file.js",
     "robot-panel.js",
     "robot-pictures.js",

@@ -152,6 +152,39 @@ class Figures(BrowserTest):
         self.press(".families .cells", Keys.ENTER)
         self.wait(lambda: f"/replay/{run}@2/1" in self.browser.current_url, "it does not play")
 
+    def test_cells_of_a_repertoire_are_judged_and_play(self):
+        config = json.loads(CONFIG.read_text())
+        config["algorithm"] |= {"name": "MAP-Elites", "judgement_trials": 3, "descriptors": [
+            {"measure": "leaders", "range": [0, 5], "cells": 8},
+            {"measure": "one_leader", "of": "end", "range": [0, 1], "cells": 4},
+        ]}
+        config["algorithm"]["populations"]["network"]["params"] = {}
+        file = pathlib.Path(self.fleet.directory.name) / "repertoire.json"
+        file.write_text(json.dumps(config))
+        self.fleet.swarmctl("submit", str(file), "--generations", "6", "--watch")
+        run = max(it["id"] for it in json.loads(self.fleet.swarmctl("list")))
+        told = json.loads(self.fleet.swarmctl("repertoire", str(run)))
+        shown = [it for it in told["elites"] if it["shown"]]
+        self.open(f"/experiment/{run}")
+        panel = self.find("details.repertoire")
+        self.wait(lambda: panel.get_attribute("data-cells") == str(len(shown)), "cells are missing")
+        self.wait_for_text(".repertoire p.muted", f"QD score {told['corrected']['qd_score']:.3f}")
+        for label in ["leaders (mean)", "one_leader (end)"]:
+            self.assertIn(label, self.text(".repertoire .cells svg"))
+        rows = list(csv.DictReader(io.StringIO(self.saved(".repertoire .save:last-child"))))
+        self.assertEqual({it["address"]: float(it["fitness"]) for it in rows}, {it["address"]: it["judged"]["fitness"] for it in shown})
+        self.script("document.querySelector('.repertoire').scrollIntoView()")
+        self.picture("repertoire")
+        elite = shown[0]
+        across, up = elite["judged"]["cell"]
+        self.press(".repertoire .cells", Keys.HOME, Keys.PAGE_DOWN, *[Keys.ARROW_RIGHT] * across, *[Keys.ARROW_UP] * up)
+        _, place = elite["address"].split("@")
+        generation, individual = place.split("/")
+        self.wait_for_text(".repertoire .readout", f"cell {across}, {up}: ")
+        self.assertIn(f"individual {individual} of generation {generation}", self.text(".repertoire .readout"))
+        self.press(".repertoire .cells", Keys.ENTER)
+        self.wait(lambda: f"/replay/{run}@{place}" in self.browser.current_url, "it does not play")
+
     def test_a_click_on_a_child_plays_it(self):
         run = self.genetic(3)
         self.open(f"/experiment/{run}")

@@ -13,7 +13,9 @@ use experiment_file::{AlgorithmDescription, Keeps};
 use model::queries::Families;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use swarm_proto::v1::{ListDynamicsRequest, ListEventsRequest, ListGenerationsRequest};
+use swarm_proto::v1::{
+    GetRepertoireRequest, ListDynamicsRequest, ListEventsRequest, ListGenerationsRequest,
+};
 
 use super::{
     Shared,
@@ -33,7 +35,8 @@ pub struct From {
     from: u64,
 }
 
-/// One experiment, its file, its champion if any, and whether its individuals have parents.
+/// One experiment, its file, its champion if any, and whether its individuals have parents in the
+/// generation before, or are a repertoire.
 pub async fn one(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -51,12 +54,13 @@ pub async fn one(
             "selection": champion.held_out.map(|selection| selection.mean),
         })
     });
-    let has_parents = found.experiment.as_ref().is_some_and(|experiment| {
+    let keeps = found.experiment.as_ref().and_then(|experiment| {
         let algorithm = AlgorithmDescription::find(ALGORITHMS, &experiment.algorithm);
-        algorithm.is_some_and(|algorithm| algorithm.keeps == Keeps::Population)
+        algorithm.map(|algorithm| algorithm.keeps)
     });
     Ok(Json(json!({
-        "has_parents": has_parents,
+        "has_parents": keeps == Some(Keeps::Population),
+        "has_repertoire": keeps == Some(Keeps::Repertoire),
         "experiment": found.experiment.map(|experiment| {
             ExperimentAnswer::new(experiment, shared.control.is_some())
         }),
@@ -97,6 +101,42 @@ pub async fn dynamics(
         ])
     });
     Ok(Json(json!({ "generations": rows.collect::<Vec<_>>(), "next": page.next_generation })))
+}
+
+/// The latest repertoire: its axes, its figures once the elites are judged, and for each cell that
+/// has an elite its indices, fitness, descriptors, and the generation and index of its birth.
+/// Fitness, descriptors and cells are judged ones, if there are any.
+pub async fn repertoire(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+) -> Result<Json<Value>, Problem> {
+    let request = GetRepertoireRequest { experiment_id: id, generation: None };
+    let found = shared.reader.get_repertoire(request).await?;
+    let shown = found.shown.iter().filter_map(|&place| found.elites.get(place as usize));
+    let shown = shown.map(|elite| {
+        let judged = elite.judged.as_ref().filter(|_| found.corrected.is_some());
+        let (cell, fitness, descriptors) = match judged {
+            Some(judged) => (&judged.cell, judged.fitness, &judged.descriptors),
+            None => (&elite.cell, elite.fitness, &elite.descriptors),
+        };
+        json!([cell, fitness, descriptors, elite.generation, elite.individual])
+    });
+    let axes = found.axes.iter().map(|axis| {
+        json!({
+            "measure": axis.measure, "of": axis.of,
+            "low": axis.low, "high": axis.high, "cells": axis.cells,
+        })
+    });
+    let corrected = found
+        .corrected
+        .map(|of| json!({"qd_score": of.qd_score, "coverage": of.coverage, "stay": of.stay}));
+    Ok(Json(json!({
+        "generation": found.generation,
+        "axes": axes.collect::<Vec<_>>(),
+        "n_elites": found.elites.len(),
+        "corrected": corrected,
+        "shown": shown.collect::<Vec<_>>(),
+    })))
 }
 
 /// The first generation of the requested children, and the stride.

@@ -135,6 +135,7 @@ impl Site {
             .route("/experiments/{id}/fitness", get(experiments::fitness))
             .route("/experiments/{id}/dynamics", get(experiments::dynamics))
             .route("/experiments/{id}/families", get(experiments::families))
+            .route("/experiments/{id}/repertoire", get(experiments::repertoire))
             .route("/experiments/{id}/live", get(live::generations))
             .route("/experiments/{id}/explain", get(fleet::explain))
             .route("/experiments/{id}/{action}", post(fleet::steer))
