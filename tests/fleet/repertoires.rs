@@ -68,3 +68,47 @@ fn forks_continue_a_repertoire_and_cannot_change_its_descriptors() {
     let ancestors = lineage.json()["populations"][0]["ancestors"].as_array().unwrap().clone();
     assert!(ancestors.iter().any(|ancestor| ancestor["operator"] == "line"), "{ancestors:?}");
 }
+
+#[test]
+fn elites_have_addresses_by_cell_and_a_repertoire_is_read_like_every_record() {
+    let coordinator = CoordinatorProcess::start();
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    for experiment in [experiment("MAP-Elites", 4), Experiment::tiny(1)] {
+        coordinator.watch(coordinator.submit(&experiment.path())).finish();
+    }
+    let found = coordinator.swarmctl(&["repertoire", "1"]).expect_success().json();
+    let data_dir = coordinator.data_dir().to_str().unwrap();
+    let read = swarmctl(["repertoire", "1", "--data-dir", data_dir]).expect_success().json();
+    assert_eq!(read, found);
+    assert_eq!(found["axes"][1]["name"], "one_leader_end");
+    let elites = found["elites"].as_array().unwrap();
+    assert!(found["corrected"]["coverage"].as_f64().unwrap() > 0.0);
+    for elite in elites {
+        assert!(elite["judged"]["fitness"].is_f64(), "{elite}");
+        let cell = elite["cell"].as_array().unwrap();
+        let address = format!("1@3/cell({},{})", cell[0], cell[1]);
+        let genotype = |address: &str| {
+            let individual = coordinator.swarmctl(&["individual", address]).expect_success();
+            individual.json()["genotype"].clone()
+        };
+        // A cell of MAP-Elites has a single elite.
+        assert_eq!(genotype(&address), genotype(elite["address"].as_str().unwrap()));
+        coordinator.swarmctl(&["lineage", &address]).expect_success();
+    }
+    // Before the end, nothing is judged.
+    let before = coordinator.swarmctl(&["repertoire", "1@2"]).expect_success().json();
+    assert!(before["corrected"].is_null() && before["elites"][0]["judged"].is_null());
+    let directory = tempfile::tempdir().unwrap();
+    let map = directory.path().join("map.png");
+    coordinator.swarmctl(&["repertoire", "1", "--to", map.to_str().unwrap()]).expect_success();
+    assert!(std::fs::read(map).unwrap().starts_with(b"\x89PNG"));
+    for (args, code, what) in [
+        (["individual", "1@3/cell(9,9)"], 2, "cell(9,9) has no elite after generation 3"),
+        (["repertoire", "2"], 2, "has no repertoire: SNES evolves none; MAP-Elites and DNS do"),
+        (["repertoire", "1@9"], 3, "generation 9 of experiment 1 is not complete"),
+    ] {
+        let refused = coordinator.swarmctl(&args);
+        assert_eq!(refused.code, Some(code), "{refused:#?}");
+        assert!(refused.stderr.contains(what), "{}", refused.stderr);
+    }
+}
