@@ -181,8 +181,9 @@ def test_no_path_leads_out_of_the_directory(tmp_path):
 
 def test_budgets_end_a_run_which_the_same_call_continues(tmp_path):
     async def script(call):
+        # A whole run of these is more than the three budgets of this test afford on any machine.
         await call.facts("draft", name="long", task="aggregation", changes={
-            "algorithm.judgement_trials": 5, "algorithm.champion_trials": 2, "algorithm.evaluation_steps": 60})
+            "algorithm.judgement_trials": 5, "algorithm.champion_trials": 2, "algorithm.evaluation_steps": 600})
         error = await call.error("run", file="long.json", seconds=1000)
         assert error["code"] == "budget" and "10 s" in error["message"]
         error = await call.error("run", file="long.json", episodes=1000)
