@@ -6,11 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bundle::LEN_MAX;
+use bundle::{LEN_MAX, sha256};
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
-use sha2::{Digest as _, Sha256};
 
 use crate::{
     args::Target,
@@ -147,9 +146,4 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
     let file = File::open(path).map_err(failed)?;
     file.take(LEN_MAX + 1).read_to_end(&mut bytes).map_err(failed)?;
     Ok(bytes)
-}
-
-/// Hexadecimal.
-pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -1,16 +1,17 @@
 //! `swarmctl verify`: proves the claims of a bundle.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use bundle::{Bundle, Claim, Flaw, Proof, Sample, Verification};
+use bundle::{Bundle, Claim, Flaw, Proof, Sample, Verification, sha256};
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
+use swarm_web::{SIMULATOR, proof_file};
 
 use super::export;
 use crate::{
-    args::IsaArgs, error::Error, progress::Progress, resimulation::Resimulation,
-    settings::Settings, waiting,
+    args::IsaArgs, error::Error, output_file::Overwrite, progress::Progress,
+    resimulation::Resimulation, settings::Settings, waiting,
 };
 
 /// Check a bundle without trusting its author.
@@ -30,6 +31,12 @@ pub struct VerifyArgs {
     /// Number of threads that simulate here [default: one per core]
     #[arg(long, value_name = "N", value_parser = crate::args::whole::<u16>(1..=1024))]
     workers: Option<u16>,
+    /// Also write a page that proves the claims in a browser: one HTML file with this bundle and the
+    /// simulator, for readers who install nothing.
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
     #[command(flatten)]
     isa: IsaArgs,
 }
@@ -42,13 +49,27 @@ Exit code 12 if a claim of the bundle is false.
 
 Examples:
   swarmctl verify leader.zip
-  swarmctl verify leader.zip --generations all --coordinator http://fleet.example:7700";
+  swarmctl verify leader.zip --generations all --coordinator http://fleet.example:7700
+  swarmctl verify leader.zip --page leader.html";
+
+const WITHOUT_SIMULATOR: &str = "--page: this program was compiled without the simulator for browsers, which \
+                                 releases have; `dist/build simulator` makes it";
 
 fn sample(text: &str) -> Result<Sample, String> {
     match (text, text.parse()) {
         ("all", _) => Ok(Sample::All),
         (_, Ok(n)) => Ok(Sample::Drawn(n)),
         _ => Err("must be a whole number, or `all`".to_owned()),
+    }
+}
+
+impl VerifyArgs {
+    /// The page to write, and the simulator within it.
+    fn page(&self) -> Result<Option<(&Path, &'static [u8])>, Error> {
+        let Some(path) = &self.page else { return Ok(None) };
+        self.overwrite.check(path)?;
+        let simulator = SIMULATOR.ok_or_else(|| Error::Input(WITHOUT_SIMULATOR.to_owned()))?;
+        Ok(Some((path, simulator)))
     }
 }
 
@@ -82,6 +103,7 @@ pub async fn verify(
     args: &VerifyArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
+    let page = args.page()?;
     let bytes = export::read(&args.file)?;
     let name = args.file.display();
     let bundle = waiting::busy(&format!("reading {name}"), || Bundle::read(&bytes))
@@ -101,26 +123,18 @@ pub async fn verify(
         }
     }
     progress.clear();
-    let Proof { proven, unproven, .. } = verification.finish();
+    let proof = verification.finish();
+    if let Some((path, simulator)) = page {
+        let name = args.file.file_name().unwrap_or_default().to_string_lossy();
+        args.overwrite.write(path, proof_file(&name, &bytes, simulator).as_bytes())?;
+        progress.remark(&format!("{} proves the same claims in a browser", path.display()));
+    }
+    let (file, sha256) = (name.to_string(), sha256(&bytes));
+    if !progress.is_json() {
+        return progress.print(&proof.to_text(&file, &sha256));
+    }
+    let Proof { proven, unproven, .. } = proof;
     let line = |(claim, what): (Claim, String)| Line { claim: claim.to_string(), what };
-    let report = Report {
-        file: name.to_string(),
-        sha256: export::sha256(&bytes),
-        proven: proven.into_iter().map(line).collect(),
-        unproven,
-    };
-    match progress.is_json() {
-        true => progress.print_document(&report),
-        false => progress.print(&report.to_text()),
-    }
-}
-
-impl Report {
-    fn to_text(&self) -> String {
-        let Self { file, sha256, proven, unproven } = self;
-        let proven = proven.iter().map(|Line { claim, what }| format!("proven    {claim}: {what}"));
-        let unproven = unproven.iter().map(|what| format!("unproven  {what}"));
-        let first = format!("{file}, SHA-256 {sha256}");
-        std::iter::once(first).chain(proven).chain(unproven).collect::<Vec<_>>().join("\n")
-    }
+    let proven = proven.into_iter().map(line).collect();
+    progress.print_document(&Report { file, sha256, proven, unproven })
 }

@@ -36,8 +36,13 @@ pub struct File {
 impl File {
     /// SHA-256 of its content, hexadecimal.
     pub fn sha256(&self) -> String {
-        Sha256::digest(&self.content).iter().map(|byte| format!("{byte:02x}")).collect()
+        sha256(&self.content)
     }
+}
+
+/// SHA-256 of a file, hexadecimal.
+pub fn sha256(content: &[u8]) -> String {
+    Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 impl Bundle {

@@ -19,7 +19,7 @@ use std::fmt;
 use evolution::{Digest, Real, Statistics};
 use serde::{Deserialize, Serialize};
 
-pub use archive::{LEN_MAX, UNPACKED_LEN_MAX, pack};
+pub use archive::{LEN_MAX, UNPACKED_LEN_MAX, pack, sha256};
 pub use files::champion_json;
 pub use sample::Sample;
 pub use verification::{Batch, Claim, Flaw, Proof, Verification};

@@ -81,6 +81,17 @@ pub struct Batch {
     pub values_per_trial: usize,
 }
 
+impl Proof {
+    /// The proof for people, one statement per line. `file`, `sha256`: name and digest of the
+    /// bundle.
+    pub fn to_text(&self, file: &str, sha256: &str) -> String {
+        let proven = self.proven.iter().map(|(claim, what)| format!("proven    {claim}: {what}"));
+        let unproven = self.unproven.iter().map(|what| format!("unproven  {what}"));
+        let first = format!("{file}, SHA-256 {sha256}");
+        std::iter::once(first).chain(proven).chain(unproven).collect::<Vec<_>>().join("\n")
+    }
+}
+
 impl fmt::Display for Claim {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {

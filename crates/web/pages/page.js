@@ -13,7 +13,7 @@ export function bar(title, current) {
   const status = element("span", { id: "connection", className: "muted" });
   document.body.prepend(element("nav", {},
     element("a", { href: "/", className: "name" }, "swarmevo"),
-    link("/", "Experiments"), link("/compare", "Compare"), link("/fleet", "Fleet"),
+    link("/", "Experiments"), link("/compare", "Compare"), link("/fleet", "Fleet"), link("/verify", "Verify"),
     element("span", { className: "space" }), status));
 }
 

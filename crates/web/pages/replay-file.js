@@ -2,10 +2,10 @@
 
 import { unpack } from "swarm/episode.js";
 import { Player, heading, readAddress } from "swarm/player.js";
+import { bytesIn } from "swarm/simulator.js";
 import { trialStrip } from "swarm/trials.js";
 
-const text = atob(document.getElementById("episode").textContent);
-const episode = await unpack(Uint8Array.from(text, (letter) => letter.charCodeAt(0)));
+const episode = await unpack(bytesIn("episode"));
 document.title = `${episode.name} – replay`;
 const player = new Player(episode);
 document.getElementById("page").append(heading(episode, { trials: episode.trials }), player.node);

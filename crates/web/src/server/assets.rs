@@ -1,4 +1,4 @@
-//! Pages, modules and the style, which are part of this program.
+//! Pages, modules, the style, and the simulator for browsers, which are part of this program.
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
@@ -15,10 +15,15 @@ use base64::{Engine as _, prelude::BASE64_STANDARD};
 use sha2::{Digest as _, Sha256};
 
 use super::problem::{Path, Problem};
-use crate::modules::{MODULES, STYLE, import_map};
+use crate::{
+    SIMULATOR,
+    modules::{MODULES, STYLE, import_map},
+};
 
 /// The addresses of modules and the style.
 pub const PREFIX: &str = "/assets/";
+
+const SIMULATOR_NAME: &str = "simulator.wasm.gz";
 
 /// The addresses of modules change with their content.
 static IMPORT_MAP: LazyLock<String> =
@@ -28,11 +33,20 @@ static IMPORT_MAP: LazyLock<String> =
 static POLICY: LazyLock<HeaderValue> = LazyLock::new(|| {
     let digest = BASE64_STANDARD.encode(Sha256::digest(IMPORT_MAP.as_bytes()));
     let policy = format!(
-        "default-src 'none'; script-src 'self' 'sha256-{digest}'; style-src 'self'; \
-         img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'self'; \
+        "default-src 'none'; script-src 'self' 'wasm-unsafe-eval' 'sha256-{digest}'; \
+         worker-src blob:; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'self'; \
          frame-ancestors 'none'"
     );
     HeaderValue::from_str(&policy).expect("ASCII is fit for a header")
+});
+
+/// A page finds the simulator by this element.
+static SIMULATOR_LINK: LazyLock<String> = LazyLock::new(|| match SIMULATOR {
+    None => String::new(),
+    Some(simulator) => format!(
+        "<link rel=\"simulator\" href=\"{PREFIX}{}/{SIMULATOR_NAME}\">\n",
+        version(simulator)
+    ),
 });
 
 /// The content policy of pages.
@@ -49,6 +63,7 @@ pub fn routes() -> Router {
         .route("/compare", page("page-compare.js"))
         .route("/fleet", page("page-fleet.js"))
         .route("/replay/{*address}", page("page-replay.js"))
+        .route("/verify", page("page-verify.js"))
         .route("/login", get(|| async { login() }))
         .route("/assets/{version}/{name}", get(asset))
         .fallback(|| async { (StatusCode::NOT_FOUND, missing()) })
@@ -77,7 +92,7 @@ fn page(module: &str) -> Html<String> {
 <title>swarmevo</title>
 <link rel="icon" href="data:,">
 <link rel="stylesheet" href="{style}">
-<script type="importmap">{map}</script>
+{simulator}<script type="importmap">{map}</script>
 <script type="module" src="{script}"></script>
 </head>
 <body>
@@ -86,27 +101,30 @@ fn page(module: &str) -> Html<String> {
 </html>
 "#,
         style = address("style.css", STYLE),
+        simulator = *SIMULATOR_LINK,
         map = *IMPORT_MAP,
         script = address(module, text),
     ))
 }
 
 async fn asset(Path((_, name)): Path<(String, String)>) -> Response {
-    static ASSETS: LazyLock<BTreeMap<&str, &str>> =
-        LazyLock::new(|| MODULES.iter().copied().chain([("style.css", STYLE)]).collect());
-    let Some(text) = ASSETS.get(name.as_str()) else {
+    static ASSETS: LazyLock<BTreeMap<&str, (&str, &[u8])>> = LazyLock::new(|| {
+        let modules = MODULES.iter().map(|&(name, text)| (name, (JAVASCRIPT, text.as_bytes())));
+        let simulator = SIMULATOR.map(|bytes| (SIMULATOR_NAME, ("application/gzip", bytes)));
+        modules.chain([("style.css", (CSS, STYLE.as_bytes()))]).chain(simulator).collect()
+    });
+    let Some(&(kind, content)) = ASSETS.get(name.as_str()) else {
         return Problem::new(StatusCode::NOT_FOUND, format!("there is no {name}")).into_response();
     };
-    let kind = if name.ends_with(".css") { "text/css" } else { "text/javascript" };
-    let headers = [
-        (CONTENT_TYPE, format!("{kind}; charset=utf-8")),
-        // A changed text gets another address, so browsers may cache it for ever.
-        (CACHE_CONTROL, "public, max-age=31536000, immutable".to_owned()),
-    ];
-    (headers, *text).into_response()
+    // Changed content gets another address, so browsers may cache it for ever.
+    let headers = [(CONTENT_TYPE, kind), (CACHE_CONTROL, "public, max-age=31536000, immutable")];
+    (headers, content).into_response()
 }
 
-/// A digest of a text.
-fn version(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().take(6).map(|byte| format!("{byte:02x}")).collect()
+const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+
+/// A digest of some content.
+fn version(content: impl AsRef<[u8]>) -> String {
+    Sha256::digest(content).iter().take(6).map(|byte| format!("{byte:02x}")).collect()
 }
