@@ -126,7 +126,7 @@ fn state_len(algorithm: &Algorithm, population_size: u64) -> u64 {
     let d = algorithm.n_genes() as u64;
     let n_numbers = match algorithm.keeps() {
         Keeps::Vectors => 6 * d,
-        Keeps::Matrix => d * d,
+        Keeps::Matrix => d * d + algorithm.n_kept() as u64,
         Keeps::Population => population_size * d,
         Keeps::Repertoire => {
             algorithm.repertoire().map_or(0, |repertoire| repertoire.n_kept() as u64 * d)

@@ -125,6 +125,8 @@ impl Evolution {
                 summary.generation, summary.n_non_finite
             ));
         }
+        let news = self.populations.iter().filter_map(|population| population.news());
+        notices.extend(news.map(|news| format!("generation {}: {news}", summary.generation)));
         let completed = completion(&summary);
         notices.extend(self.remarks(widest_before, &summary, completed.is_some()));
         Ok(Learnt { summary, notices, completed })

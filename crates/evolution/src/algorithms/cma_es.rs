@@ -16,6 +16,7 @@ use super::{
     linalg::{Eigen, Symmetric},
     mirror,
     parameters::{MU_INIT, SIGMA_INIT},
+    restarts::RESTARTS,
 };
 
 /// A Gaussian with mean m and covariance sigma^2 C, of points x in all of R^d.
@@ -44,23 +45,44 @@ impl Described for CmaEs {
         individuals_min: 2,
         learns_from: LearnsFrom::Ranks,
         genes_max: Some(limits::GENES_OF_FULL_MATRIX),
-        parameters: &[MU_INIT, SIGMA_INIT],
+        parameters: &[MU_INIT, SIGMA_INIT, RESTARTS],
     };
 
-    /// C = I.
     fn start(params: &Params, d: usize) -> Self {
-        Self {
-            mean: vec![params.value_of(&MU_INIT); d],
-            covariance: Symmetric::identity(d),
-            cumulation: Cumulation::new(params.value_of(&SIGMA_INIT), d),
-        }
+        Self::from_mean(vec![params.value_of(&MU_INIT); d], params.value_of(&SIGMA_INIT))
     }
 }
 
 impl CmaEs {
+    /// A first distribution, with C = I.
+    pub fn from_mean(mean: Vec<f64>, sigma: f64) -> Self {
+        let d = mean.len();
+        Self { mean, covariance: Symmetric::identity(d), cumulation: Cumulation::new(sigma, d) }
+    }
+
+    /// The decomposition of C.
+    pub fn eigen(&self) -> Eigen {
+        Eigen::new(&self.covariance.to_dense())
+    }
+
+    /// The steps y_i = C^(1/2) z_i of these normals z_i.
+    pub fn steps(&self, normals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let (eigen, deviations) = self.root();
+        let colour = |z: &Vec<f64>| eigen.apply(&deviations, &DVector::from_column_slice(z));
+        normals.iter().map(|z| colour(z).as_slice().to_vec()).collect()
+    }
+
+    /// Whether the standard deviations of all genes, and the path of C in units of sigma, are
+    /// below `limit`.
+    pub fn is_narrower_than(&self, limit: f64) -> bool {
+        let sigma = self.cumulation.sigma;
+        let is_short = self.cumulation.p_c.iter().all(|p| sigma * p.abs() < limit);
+        is_short && self.deviations().is_some_and(|of_each| of_each.iter().all(|s| *s < limit))
+    }
+
     /// Eigenvectors of C and the square roots of its eigenvalues.
     fn root(&self) -> (Eigen, DVector<f64>) {
-        let eigen = Eigen::new(&self.covariance.to_dense());
+        let eigen = self.eigen();
         let min = EIGENVALUE_RATIO_MIN * eigen.values.max();
         let deviations = eigen.values.map(|value| value.max(min).sqrt());
         (eigen, deviations)
@@ -85,10 +107,8 @@ impl Strategy for CmaEs {
     /// x_i = m + sigma * y_i, y_i = C^(1/2) z_i, z_i ~ N(0, I). With the symmetric
     /// root, z_i is also C^(-1/2) y_i, so learning needs no root.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let (eigen, deviations) = self.root();
         let normals = draw_normals(population_size, self.mean.len(), rng);
-        let colour = |z: &Vec<f64>| eigen.apply(&deviations, &DVector::from_column_slice(z));
-        let steps: Vec<Vec<f64>> = normals.iter().map(|z| colour(z).as_slice().to_vec()).collect();
+        let steps = self.steps(&normals);
         let sigma = self.cumulation.sigma;
         let genotypes = steps
             .iter()

@@ -16,8 +16,10 @@ mod pairs;
 mod parameters;
 mod pgpe;
 mod repertoire;
+mod restarts;
 mod sep_cma_es;
 mod snes;
+mod stopping;
 mod xnes;
 
 use std::iter;
@@ -51,51 +53,65 @@ macro_rules! kind {
 }
 
 /// Declares the algorithms: the state of each, its description, its start. Those `in Repertoire`
-/// learn from fitness and descriptors, all others from fitness.
+/// learn from fitness and descriptors, all others from fitness. A *form* is another state of a
+/// described algorithm, which its parameters choose. Append groups, because the place of a row is
+/// part of the format of keyframes.
 macro_rules! registry {
-    ($($(#[$doc:meta])* $module:ident::$name:ident $(in $repertoire:ident)?,)*) => {
+    ($(
+        described { $($(#[$doc:meta])* $module:ident::$name:ident $(in $repertoire:ident)?,)* }
+        forms { $($(#[$form_doc:meta])* $form_module:ident::$form:ident,)* }
+    )*) => {
         /// The algorithms, each with its state. A variant's place is part of the format of
         /// keyframes.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-        pub enum Algorithm {
+        pub enum Algorithm {$(
             $($(#[$doc])* $name(kind!(state: $module::$name $(, $repertoire)?)),)*
-        }
+            $($(#[$form_doc])* $form($form_module::$form),)*
+        )*}
 
         /// The descriptions of all algorithms, for the reader of experiment files.
         pub static ALGORITHMS: &[AlgorithmDescription] =
-            &[$(kind!(description: $module::$name $(, $repertoire)?),)*];
+            &[$($(kind!(description: $module::$name $(, $repertoire)?),)*)*];
 
         impl Algorithm {
             /// The algorithm of this name before its first generation; `None` if no algorithm has
             /// this name. `d`: number of genes of the population, at least 1. `axes`: the grid of
             /// descriptors, for algorithms that learn from them.
             pub fn new(name: &str, params: &Params, d: usize, axes: &[Axis]) -> Option<Self> {
-                $(if name == kind!(description: $module::$name $(, $repertoire)?).name {
+                $($(if name == <$form_module::$form as Form>::DESCRIPTION.name
+                    && let Some(form) = Form::start(params, d)
+                {
+                    return Some(Self::$form(form));
+                })*)*
+                $($(if name == kind!(description: $module::$name $(, $repertoire)?).name {
                     return Some(Self::$name(kind!(start: params, d, axes $(, $repertoire)?)));
-                })*
+                })*)*
                 None
             }
 
             /// The largest part of its state between generations.
             pub fn keeps(&self) -> Keeps {
-                match self {
+                match self {$(
                     $(Self::$name(_) => {
                         kind!(description: $module::$name $(, $repertoire)?).keeps
                     })*
-                }
+                    $(Self::$form(_) => <$form_module::$form as Form>::DESCRIPTION.keeps,)*
+                )*}
             }
 
             /// Learns from a generation that [`sample`](Self::sample) drew from this state.
             pub fn learn(&mut self, lesson: &Lesson<'_>) {
-                match self {
+                match self {$(
                     $(Self::$name(state) => kind!(learn: state, lesson $(, $repertoire)?),)*
-                }
+                    $(Self::$form(state) => kind!(learn: state, lesson),)*
+                )*}
             }
 
             fn kind(&self) -> Kind<'_> {
-                match self {
+                match self {$(
                     $(Self::$name(state) => kind!(name: state $(, $repertoire)?),)*
-                }
+                    $(Self::$form(state) => kind!(name: state),)*
+                )*}
             }
         }
     };
@@ -118,24 +134,30 @@ pub struct Lesson<'a> {
 }
 
 registry! {
-    /// Genetic algorithm.
-    ga::Ga,
-    /// Separable natural evolution strategy.
-    snes::Snes,
-    /// Exponential natural evolution strategy.
-    xnes::Xnes,
-    /// Covariance matrix adaptation.
-    cma_es::CmaEs,
-    /// Covariance matrix adaptation with a diagonal matrix.
-    sep_cma_es::SepCmaEs,
-    /// OpenAI's evolution strategy.
-    openai_es::OpenAiEs,
-    /// Policy gradients with ClipUp.
-    pgpe::Pgpe,
-    /// The best of every cell of a grid.
-    map_elites::MapElites in Repertoire,
-    /// Those far from all that are fitter.
-    dns::Dns in Repertoire,
+    described {
+        /// Genetic algorithm.
+        ga::Ga,
+        /// Separable natural evolution strategy.
+        snes::Snes,
+        /// Exponential natural evolution strategy.
+        xnes::Xnes,
+        /// Covariance matrix adaptation.
+        cma_es::CmaEs,
+        /// Covariance matrix adaptation with a diagonal matrix.
+        sep_cma_es::SepCmaEs,
+        /// OpenAI's evolution strategy.
+        openai_es::OpenAiEs,
+        /// Policy gradients with ClipUp.
+        pgpe::Pgpe,
+        /// The best of every cell of a grid.
+        map_elites::MapElites in Repertoire,
+        /// Those far from all that are fitter.
+        dns::Dns in Repertoire,
+    }
+    forms {
+        /// CMA-ES that restarts.
+        restarts::RestartingCmaEs,
+    }
 }
 
 /// An algorithm by what it learns from.
@@ -154,12 +176,16 @@ pub struct Sample {
     pub normals: Vec<Vec<f64>>,
     /// The correlated normals, for algorithms that learn from both; otherwise empty.
     pub steps: Vec<Vec<f64>>,
+    /// Uniform draws for decisions after the generation, for algorithms that make some; otherwise
+    /// empty.
+    pub uniforms: Vec<f64>,
 }
 
 impl Sample {
     /// Individuals and the normals behind them.
     pub fn new(genotypes: Vec<Genotype>, normals: Vec<Vec<f64>>) -> Self {
-        Self { genotypes: genotypes.into(), normals, steps: Vec::new() }
+        let genotypes = genotypes.into();
+        Self { genotypes, normals, steps: Vec::new(), uniforms: Vec::new() }
     }
 }
 
@@ -214,6 +240,17 @@ pub trait Strategy {
     /// individuals, best first, those without finite fitness last (see
     /// [`ranking`](super::ranking::ranking)).
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]);
+
+    /// Number of random numbers that the state keeps of earlier generations.
+    fn n_kept(&self) -> usize {
+        0
+    }
+
+    /// What people should know of the latest generation that the algorithm learnt from, as a
+    /// sentence without a full stop.
+    fn news(&self) -> Option<String> {
+        None
+    }
 }
 
 /// The description of an algorithm for experiment files.
@@ -224,6 +261,16 @@ pub trait Described: Strategy {
     /// Its state before the first generation, over `d` genes (at least 1).
     /// `params` lie in the domains of the description.
     fn start(params: &Params, d: usize) -> Self;
+}
+
+/// Another state of a described algorithm.
+pub trait Form: Strategy + Sized {
+    /// The description of the algorithm.
+    const DESCRIPTION: AlgorithmDescription;
+
+    /// Its state before the first generation, as [`Described::start`]; `None` if `params` choose
+    /// the described state itself.
+    fn start(params: &Params, d: usize) -> Option<Self>;
 }
 
 impl Algorithm {
@@ -290,6 +337,16 @@ impl Algorithm {
             Kind::Strategy(strategy) => Some(strategy),
             Kind::Repertoire(_) => None,
         }
+    }
+
+    /// See [`Strategy::n_kept`].
+    pub fn n_kept(&self) -> usize {
+        self.strategy().map_or(0, Strategy::n_kept)
+    }
+
+    /// See [`Strategy::news`].
+    pub fn news(&self) -> Option<String> {
+        self.strategy()?.news()
     }
 }
 

@@ -10,10 +10,14 @@ const EXPERIMENT: &str = include_str!("../../../../configs/quickstart.json");
 
 /// The canonical form of an experiment by this algorithm with its defaults.
 fn canonical(algorithm: &str) -> String {
+    canonical_with(algorithm, &json!({}))
+}
+
+fn canonical_with(algorithm: &str, params: &Value) -> String {
     let mut file: Value = serde_json::from_str(EXPERIMENT).unwrap();
     file["algorithm"]["name"] = json!(algorithm);
     for population in file["algorithm"]["populations"].as_object_mut().unwrap().values_mut() {
-        population["params"] = json!({});
+        population["params"] = params.clone();
     }
     let (config, _) = ExperimentConfig::from_json(&file.to_string(), "", ALGORITHMS).unwrap();
     config.to_canonical_json()
@@ -42,6 +46,14 @@ fn defaults_are_written_out_in_a_fixed_order() {
         let canonical = canonical(algorithm);
         assert!(canonical.contains(&format!(r#""params":{expected}"#)), "{canonical}");
     }
+}
+
+#[test]
+fn a_recent_key_is_written_out_unless_it_has_its_default() {
+    let of_restarts = |restarts: &str| canonical_with("CMA-ES", &json!({"restarts": restarts}));
+    assert_eq!(of_restarts("none"), canonical("CMA-ES"));
+    let with = r#""params":{"mu_init":0.5,"sigma_init":0.2,"restarts":"bipop"}"#;
+    assert!(of_restarts("bipop").contains(with));
 }
 
 #[test]

@@ -175,6 +175,14 @@ fn cma_es() {
 }
 
 #[test]
+fn cma_es_with_restarts() {
+    for restarts in ["ipop", "bipop"] {
+        let params = Params::default().with("restarts", restarts);
+        assert_converges("CMA-ES", &params, &[case((Rastrigin, 5), 10, 1e-9, 42_000)]);
+    }
+}
+
+#[test]
 fn sep_cma_es() {
     assert_converges(
         "sep-CMA-ES",

@@ -330,6 +330,12 @@ fn the_formats_of_keyframes_and_of_the_log_stay() {
         "010b03010101",
         "version, seed, P, generations, populations, SNES"
     );
+    let place = |algorithm: &str, params: &Params| {
+        evolution_of(vec![Algorithm::new(algorithm, params, 2, &[]).unwrap()], 3).keyframe()[5]
+    };
+    let names = ["GA", "SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES", "PGPE"];
+    assert_eq!(names.map(|name| place(name, &Params::default())), [0, 1, 2, 3, 4, 5, 6]);
+    assert_eq!(place("CMA-ES", &Params::default().with("restarts", "ipop")), 9);
 }
 
 /// Older versions wrote NaN as an interval where sums overflowed.

@@ -50,10 +50,13 @@ pub fn genetic_algorithms(has_selection: impl Fn(&str) -> bool) -> Vec<Variant> 
     variants
 }
 
-/// Every algorithm with its defaults, the genetic one with all its operators.
+/// Every algorithm with its defaults, the genetic one with all its operators, and restarts.
 fn all() -> Vec<Variant> {
     let others = by_fitness().map(|algorithm| algorithm.name).filter(|name| *name != "GA");
-    others.map(|name| (name, params(&[]))).chain(genetic_algorithms(|_| true)).collect()
+    let restarts =
+        ["ipop", "bipop"].map(|name| ("CMA-ES", Params::default().with("restarts", name)));
+    let with_defaults = others.map(|name| (name, params(&[])));
+    with_defaults.chain(restarts).chain(genetic_algorithms(|_| true)).collect()
 }
 
 pub fn start(

@@ -229,11 +229,11 @@ constructors! {
 macro_rules! setters {
     ($(
         $(#[$doc:meta])*
-        $name:ident($($arg:ident: $type:ty),*) = $($field:ident: $value:expr),*;
+        $vis:vis $name:ident($($arg:ident: $type:ty),*) = $($field:ident: $value:expr),*;
     )*) => {
         impl Parameter {$(
             $(#[$doc])*
-            pub(crate) const fn $name(self, $($arg: $type),*) -> Self {
+            $vis const fn $name(self, $($arg: $type),*) -> Self {
                 Self { $($field: $value,)* ..self }
             }
         )*}
@@ -242,26 +242,26 @@ macro_rules! setters {
 
 setters! {
     /// The same with a unit.
-    measured(unit: &'static str) = unit: unit;
+    pub(crate) measured(unit: &'static str) = unit: unit;
     /// The same with another default under the semantics of SpikeSwarmSim.
-    original(default: DefaultValue) = original: Some(Original::Value(default));
+    pub(crate) original(default: DefaultValue) = original: Some(Original::Value(default));
     /// The same with a default under the semantics of SpikeSwarmSim that follows from earlier
     /// parameters.
-    original_from(default: fn(&Params) -> f64) = original: Some(Original::From(default));
+    pub(crate) original_from(default: fn(&Params) -> f64) = original: Some(Original::From(default));
     /// The same with this text for the default.
-    shown(text: &'static str) = default_text: text;
+    pub(crate) shown(text: &'static str) = default_text: text;
     /// The same with a second key for its quantity.
-    also(also: Also) = also: Some(also);
+    pub(crate) also(also: Also) = also: Some(also);
     /// The same as a replacement of an earlier parameter.
-    instead_of(key: &'static str) = instead_of: Some(key);
+    pub(crate) instead_of(key: &'static str) = instead_of: Some(key);
     /// The same, with null allowed.
-    or_null() = is_nullable: true;
+    pub(crate) or_null() = is_nullable: true;
     /// The same, with null allowed, which is then the default.
-    null() = is_nullable: true, default: DefaultValue::Null;
+    pub(crate) null() = is_nullable: true, default: DefaultValue::Null;
     /// The same, omitted from the canonical form if it has its default.
-    recent() = is_recent: true;
+    pub recent() = is_recent: true;
     /// The same, omitted from the canonical form if it is 0.
-    unless_zero() = is_absent_at_zero: true;
+    pub(crate) unless_zero() = is_absent_at_zero: true;
 }
 
 impl Parameter {

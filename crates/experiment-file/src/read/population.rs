@@ -76,8 +76,10 @@ fn params_of(o: &mut Places<'_, '_>, algorithm: &'static AlgorithmDescription) -
     for key in GENETIC_KEYS.into_iter().filter(|key| !algorithm.has(key)) {
         o.ignored(key, "only the genetic algorithm has it");
     }
-    // The canonical form omits values that the algorithm computes.
-    parameters::params(o, algorithm.parameters, Semantics::Thesis, &[])
+    let read = parameters::params(o, algorithm.parameters, Semantics::Thesis, &[]);
+    // The canonical form omits values that the algorithm computes, and defaults of recent keys.
+    let values = algorithm.parameters.iter().filter_map(|key| Some((key, read.get(key)?)));
+    values.fold(Params::default(), |params, (key, value)| params.with_canonical(key, value))
 }
 
 /// The two places of an algorithm's parameters: `params`, or the population

@@ -193,6 +193,10 @@ fn params(dice: &mut Dice, algorithm: &str) -> Value {
                 ("sigma_max_change", json!(0.25)),
             ],
         ),
+        "CMA-ES" => {
+            let restarts = json!(dice.pick(&["none", "ipop", "bipop"]));
+            object(dice, [("mu_init", mu_init), ("sigma_init", sigma), ("restarts", restarts)])
+        }
         _ => object(dice, [("mu_init", mu_init), ("sigma_init", sigma)]),
     }
 }
