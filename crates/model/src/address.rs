@@ -63,8 +63,8 @@ impl fmt::Display for Cell {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is not ID (the champion of experiment ID), ID@G (generation G), ID@G/I (its individual \
-     I), ID@G/mean (the mean of the distribution after it) or 'ID@G/cell(A,B)' (an elite of the \
-     repertoire after it, in quotes); all are numbers from 0"
+     I), ID@G/mean (the mean of the distribution after it) or 'ID@G/cell(A,B)' (an elite, in \
+     quotes); all are numbers from 0"
 )]
 pub struct NotAnAddress(String);
 
