@@ -121,6 +121,7 @@ CASES = {
             "mean.generation": lambda run, it: run.mean(it),
             "individuals.generation": lambda run, it: run.individuals(it),
             "fitness.generation": lambda run, it: run.fitness(it),
+            "repertoire.generation": lambda run, it: run.repertoire(it),
         }.items()
     },
     "analysis.ablation.trials": lambda it: analysis.ablation(QUICK, GENES, "groups", trials=it),
@@ -197,7 +198,7 @@ def test_no_number_is_forgotten():
     assert left <= {"Evolution.n_genes", "Evolution.population_size", "Evolution.seed", "RecordedRun.experiment_id",
                     "FleetRun.experiment_id", "RecordedRun.fitness_log.generations", "FleetRun.fitness_log.generations",
                     "Trace.where", "Episodes.where", *(f"FleetRun.{it}" for it in (
-                        "individual.generation", "individual.index", "mean.generation", "individuals.generation", "fitness.generation"))} | {
+                        "individual.generation", "individual.index", "mean.generation", "individuals.generation", "fitness.generation", "repertoire.generation"))} | {
         it for it in left if it.startswith("analysis.") and inspect.isclass(getattr(analysis, it.split(".")[1])) and it.count(".") == 2
     }, left
 

@@ -1,0 +1,72 @@
+"""Repertoires of recorded runs as tables."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import swarmevo
+
+PROJECT = Path(__file__).resolve().parents[2]
+TASK = PROJECT / "configs/repertoires/flocking.json"
+
+
+@pytest.fixture(scope="module")
+def run(programs, tmp_path_factory):
+    directory = tmp_path_factory.mktemp("repertoires")
+    config = swarmevo.Experiment.from_file(TASK).to_dict()
+    config["algorithm"] |= {
+        "generations": 4, "population_size": 12, "num_evaluations": 2, "evaluation_steps": 20, "champion_trials": 2,
+        "judgement_trials": 3,
+    }
+    file = directory / "flocking.json"
+    file.write_text(json.dumps(config))
+    data = directory / "data"
+    subprocess.run([programs / "swarmctl", "run", file, "--data-dir", data], check=True, capture_output=True)
+    return swarmevo.open(data).run(1)
+
+
+def test_a_row_is_an_elite_with_its_behaviour_and_its_worth(run):
+    pytest.importorskip("pandas")
+    elites = run.repertoire()
+    axes = elites.attrs["axes"]
+    assert len(axes) == 2 and all(axis["cells"] > 1 for axis in axes.values())
+    for name, axis in axes.items():
+        assert elites[name].between(*axis["range"]).all()
+    assert elites["judged_fitness"].notna().all() and elites["trials"].ge(2).all()
+    # By judged behaviour, a cell shows one of its elites.
+    shown = elites[elites["shown"]]
+    assert shown["judged_cell"].is_unique and set(shown["judged_cell"]) == set(elites["judged_cell"])
+    corrected = elites.attrs["corrected"]
+    n_cells = 1
+    for axis in axes.values():
+        n_cells *= axis["cells"]
+    assert corrected["coverage"] == pytest.approx(len(shown) / n_cells)
+    assert corrected["qd_score"] == pytest.approx(shown["judged_fitness"].sum())
+    assert corrected["stay"] == pytest.approx((elites["cell"] == elites["judged_cell"]).mean())
+
+
+def test_addresses_of_elites_lead_to_them(run):
+    pytest.importorskip("pandas")
+    elites = run.repertoire()
+    generation, individual = elites["address"].iloc[0].split("@")[1].split("/")
+    found = run.individual(int(generation), int(individual))
+    assert found.genotype.shape == (run.experiment.n_genes,)
+
+
+def test_earlier_repertoires_are_not_judged(run):
+    pytest.importorskip("pandas")
+    elites = run.repertoire(1)
+    assert elites["judged_fitness"].isna().all() and "corrected" not in elites.attrs
+    assert elites[elites["shown"]]["cell"].is_unique
+
+
+def test_other_runs_have_none(tmp_path):
+    pytest.importorskip("pandas")
+    quick = swarmevo.Experiment.quickstart().replace(
+        generations=2, evaluation_steps=10, champion_trials=2, judgement_trials=2
+    )
+    recorded = swarmevo.evolve(quick, progress=False, data_dir=tmp_path)
+    with pytest.raises(swarmevo.RefusedArgument, match="SNES evolves none"):
+        swarmevo.open(tmp_path).run(recorded.id).repertoire()
