@@ -179,6 +179,8 @@ fn every_advised_command_for_a_waiting_paused_or_ended_experiment_works() {
 async fn the_advised_commands_readmit_workers_in_quarantine() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
+    // One mended worker ends the first experiment, and its findings with it.
+    let endless = coordinator.submit(&Experiment::tiny(100_000).path());
     // A shell would split these arguments.
     let names = ["lab 2's", "$(false)"];
     for name in names {
@@ -189,15 +191,15 @@ async fn the_advised_commands_readmit_workers_in_quarantine() {
     }
     // Their machines are repaired.
     let _mended = names.map(|name| WorkerProcess::start(&coordinator, name));
-    wait_for_finding(&coordinator, id, "quarantine", "2 workers");
-    let available = wait_for_finding(&coordinator, id, "no_workers_available", "none of 2");
+    wait_for_finding(&coordinator, endless, "quarantine", "2 workers");
+    let available = wait_for_finding(&coordinator, endless, "no_workers_available", "none of 2");
     let reasons = carry_out(&coordinator, step(&available, 0)).stdout;
     assert_eq!(reasons.matches("the wheels came off").count(), 2, "{reasons}");
     for n_left in ["2 workers", "1 worker "] {
-        let quarantine = wait_for_finding(&coordinator, id, "quarantine", n_left);
+        let quarantine = wait_for_finding(&coordinator, endless, "quarantine", n_left);
         carry_out(&coordinator, step(&quarantine, 1));
     }
-    wait_for_end_of_finding(&coordinator, id, "quarantine");
+    wait_for_end_of_finding(&coordinator, endless, "quarantine");
     assert_undisturbed(&coordinator, id);
 }
 
