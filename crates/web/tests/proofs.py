@@ -40,7 +40,7 @@ class Proofs(BrowserTest):
         cls.page = cls.directory / "quickstart.html"
         made = swarmctl("verify", cls.bundle, "--page", cls.page)
         if "without the simulator" in made.stderr:
-            print("SKIPPED, but can be installed: the programs have no simulator for browsers; dist/build simulator makes it")
+            print("SKIPPED: the programs have no simulator for browsers; dist/build simulator makes it")
             sys.exit(0)
         assert made.returncode == 0, made.stderr
         # A browser does not know the folder of a file.
