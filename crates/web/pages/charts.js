@@ -32,6 +32,24 @@ export function path(points) {
   return points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
 }
 
+/** Margins around the cells of a map, pixels; left and right as in charts, so that generations are
+ *  aligned. */
+export const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
+
+/** A map for a file: its axes, and the canvas of its cells within them. `stage`: the element of the
+ *  page that holds both. */
+export function mapFigure(stage, axes, cells) {
+  const svg = axes.cloneNode(true);
+  const box = { x: EDGE.left, y: EDGE.top, width: cells.clientWidth, height: cells.clientHeight };
+  svg.append(shape("image", { ...box, preserveAspectRatio: "none", href: cells.toDataURL() }), shape("path", { d: path([[box.x, box.y], [box.x, box.y + box.height], [box.x + box.width, box.y + box.height]]), fill: "none" }));
+  // Only elements of a page have a style.
+  svg.style.position = "absolute";
+  svg.style.visibility = "hidden";
+  stage.append(svg);
+  queueMicrotask(() => svg.remove());
+  return svg;
+}
+
 /** Lines and labels of both axes. `inner`: the edges of the area between them; `x` and `y`: the
  *  pixel of a value; `x0` to `x1` and `y0` to `y1`: the visible values. */
 export function axes({ inner, x0, x1, x }, y0, y1, y, height, xLabel, yLabel) {

@@ -2,15 +2,12 @@
 // above; a click on a cell plays the individual.
 
 import { canvas, decimals, element } from "swarm/dom.js";
-import { path, shape } from "swarm/charts.js";
+import { EDGE, mapFigure, shape } from "swarm/charts.js";
 import { exports } from "swarm/export.js";
 import { FitnessPages } from "swarm/fitness-pages.js";
 import { complain, resolve } from "swarm/page.js";
 import { STOPS, rampColor, ticks } from "swarm/scales.js";
 
-/** Margins around the cells, pixels; left and right as in charts, so that generations are aligned.
- *  */
-const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
 /** Minimum size of a cell with lines between cells, pixels. */
 const LINES_FROM = 7;
 
@@ -37,7 +34,7 @@ export function heatMap(id, onZoom = () => {}) {
   const axes = shape("svg", { "aria-hidden": "true" });
   const stage = element("div", { className: "cells", tabIndex: 0, role: "group", "aria-roledescription": "heat map", "aria-label": "fitness of every individual of every generation; arrow keys go through them, Enter plays one, + and - zoom" }, axes, picture);
   const scale = element("span", { className: "scale muted small" });
-  const files = exports({ svg: () => whole(), table: () => table(), name: () => `individuals-${id}` });
+  const files = exports({ svg: () => mapFigure(stage, axes, picture), table: () => table(), name: () => `individuals-${id}` });
   const node = element("section", { className: "panel heat-map" },
     element("header", {}, element("h2", {}, "Every individual"), element("span", { className: "muted" }, "click one to play it, drag to zoom"),
       element("span", { className: "space" }), scale, element("label", {}, sort, "best on top")),
@@ -242,19 +239,6 @@ export function heatMap(id, onZoom = () => {}) {
     draw();
   });
   new ResizeObserver(draw).observe(stage);
-
-  /** Axes and cells as one figure. */
-  const whole = () => {
-    const svg = axes.cloneNode(true);
-    const box = { x: EDGE.left, y: EDGE.top, width: picture.clientWidth, height: picture.clientHeight };
-    svg.append(shape("image", { ...box, preserveAspectRatio: "none", href: picture.toDataURL() }), shape("path", { d: `${path([[box.x, box.y], [box.x, box.y + box.height], [box.x + box.width, box.y + box.height]])}`, fill: "none" }));
-    // Only elements of a page have a style.
-    svg.style.position = "absolute";
-    svg.style.visibility = "hidden";
-    stage.append(svg);
-    queueMicrotask(() => svg.remove());
-    return svg;
-  };
 
   /** The visible values as a table. */
   const table = () => {

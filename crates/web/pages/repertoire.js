@@ -2,13 +2,11 @@
 // plays its elite.
 
 import { canvas, decimals, element } from "swarm/dom.js";
-import { path, shape } from "swarm/charts.js";
+import { EDGE, mapFigure, shape } from "swarm/charts.js";
 import { exports } from "swarm/export.js";
 import { askJson } from "swarm/page.js";
 import { STOPS, extremes, rampColor, ticks } from "swarm/scales.js";
 
-/** Margins around the cells, pixels, as in the map of individuals. */
-const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
 /** Minimum size of a cell with lines between cells, pixels. */
 const LINES_FROM = 7;
 /** Time between two requests while evolution goes on, ms: the server repeats generations. */
@@ -33,7 +31,7 @@ export function repertoirePanel(id) {
   const picture = canvas((context, width, height) => paint(context, width, height), "");
   const axes = shape("svg", { "aria-hidden": "true" });
   const stage = element("div", { className: "cells", tabIndex: 0, role: "group", "aria-roledescription": "heat map", "aria-label": "fitness of the elite of every cell of behaviours; arrow keys go through the cells, Enter plays an elite" }, axes, picture);
-  const files = exports({ svg: () => whole(), table: () => table(), name: () => `repertoire-${id}` });
+  const files = exports({ svg: () => mapFigure(stage, axes, picture), table: () => table(), name: () => `repertoire-${id}` });
   const node = element("details", { className: "panel repertoire", hidden: true, open: true, ontoggle: () => ask() },
     element("summary", {}, "Repertoire"),
     element("header", {}, element("span", { className: "muted" }, "click a cell to play its elite"), element("span", { className: "space" }), scale),
@@ -167,19 +165,6 @@ export function repertoirePanel(id) {
     actions[event.key]();
   });
   new ResizeObserver(draw).observe(stage);
-
-  /** Axes and cells as one figure. */
-  const whole = () => {
-    const svg = axes.cloneNode(true);
-    const box = { x: EDGE.left, y: EDGE.top, width: picture.clientWidth, height: picture.clientHeight };
-    svg.append(shape("image", { ...box, preserveAspectRatio: "none", href: picture.toDataURL() }), shape("path", { d: `${path([[box.x, box.y], [box.x, box.y + box.height], [box.x + box.width, box.y + box.height]])}`, fill: "none" }));
-    // Only elements of a page have a style.
-    svg.style.position = "absolute";
-    svg.style.visibility = "hidden";
-    stage.append(svg);
-    queueMicrotask(() => svg.remove());
-    return svg;
-  };
 
   /** The shown elites. */
   const table = () => [
