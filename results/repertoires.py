@@ -2,7 +2,7 @@
 """Prints the table of repertoires in docs/gallery.md, from the bundles in results/repertoires.
 
     results/repertoires.py              prints it
-    results/repertoires.py --update     writes it into that page, and the maps into docs/figures
+    results/repertoires.py --update     writes it into that page, the maps into docs/figures, the elites beside the bundles
     results/repertoires.py --run        evolves them anew before, in three minutes of one core each
 
 Needs `swarmctl` on the path, Python 3.9 and nothing else.
@@ -39,8 +39,8 @@ def line(name):
     with tempfile.TemporaryDirectory() as data:
         swarmctl("import", bundle, "--data-dir", data)
         found = json.loads(swarmctl("repertoire", 1, "--output", "json", "--data-dir", data))
-        bundle.with_suffix(".csv").write_text(swarmctl("repertoire", 1, "--output", "csv", "--data-dir", data))
         if "--update" in sys.argv:
+            bundle.with_suffix(".csv").write_text(swarmctl("repertoire", 1, "--output", "csv", "--data-dir", data))
             swarmctl("repertoire", 1, "--to", DOCS / "figures" / f"repertoire-{name}.png", "--force", "--data-dir", data)
     of = found["corrected"]
     descriptors = ", ".join(f"`{axis['measure']}`" for axis in found["axes"])

@@ -372,6 +372,17 @@ fn the_gallery_has_the_table_that_its_script_prints() {
 }
 
 #[test]
+fn the_gallery_has_the_repertoires_of_the_bundles() {
+    let Some(mut command) = python_script(results("repertoires.py")) else { return };
+    let table = Outcome::of_command(&mut command).expect_success().stdout;
+    assert_eq!(table.lines().count(), 4, "a head of two lines, and two repertoires: {table}");
+    let page = fs::read_to_string(workspace_file("docs/gallery.md")).unwrap();
+    for row in table.lines() {
+        assert!(page.contains(row), "the gallery lacks what repertoires.py prints: {row}");
+    }
+}
+
+#[test]
 fn algorithms_are_compared_on_the_same_budget() {
     let project = project_with("algorithms.py");
     let path = |path: &str| project.path().join(path);
