@@ -99,4 +99,5 @@ fn senseless_messages_are_refused() {
         let (answer, _) = call(&mut session, &request, b"123");
         assert!(answer["error"].is_string(), "{request}: {answer}");
     }
+    assert!(numbers_of(b"123").is_err(), "a part of a number");
 }
