@@ -2,8 +2,9 @@
 //!
 //! An algorithm is one file and one row of the registry below. The file of an algorithm that learns
 //! from fitness implements [`Strategy`] and [`Described`]. The file of an algorithm that evolves a
-//! repertoire of different behaviours implements [`Rule`]. Its names, parameters and limits in experiment files, in their JSON Schema,
-//! in `docs/keys.md` and in `docs/algorithms.md` follow from its description.
+//! repertoire of different behaviours implements [`Rule`]. Its names, parameters and limits in
+//! experiment files, in their JSON Schema, in `docs/keys.md` and in `docs/algorithms.md` follow from
+//! its description.
 
 mod cma_es;
 mod cumulation;
