@@ -1,8 +1,8 @@
 //! All bounds on the memory and time that the network can make the coordinator spend.
 //!
 //! A request over a bound waits at the peer, or gets a status that names the bound; nothing
-//! grows. `sim_core` bounds the contents of experiment files; `docs/security.md` lists
-//! the bounds that an honest user can meet.
+//! grows. `experiment_file::limits` bounds the contents of experiment files; `docs/security.md`
+//! lists the bounds that an honest user can meet.
 
 use std::time::Duration;
 

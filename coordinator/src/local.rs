@@ -3,7 +3,7 @@
 
 use std::{path::Path, time::Duration};
 
-use evolution::{Champion, Evolution, Statistics, Told};
+use evolution::{Champion, Evolution, Statistics, Told, mean};
 use experiment_file::ConfigError;
 use model::restored::restore_evolution;
 
@@ -12,7 +12,7 @@ use crate::{
     control::{Existing, Placement, place},
     ids::ExperimentId,
     limits::UNFINISHED_MAX,
-    runs::{describe, describe_judgement, describe_repertoire},
+    runs::{describe, describe_elites, describe_judgement},
     store::{
         Entry, ExperimentRecord, ExperimentState, GenerationCommit, GenerationRecord, Store,
         StoreError,
@@ -145,7 +145,7 @@ impl LocalRun {
         }
         if !told.end.judgement.is_empty() {
             notices.extend(outcome.champion.as_ref().map(describe_judgement));
-            notices.extend(describe_repertoire(evolution, &told.end));
+            notices.extend(describe_elites(evolution, &told.end));
         }
         let bytes = told.to_bytes();
         let keyframe = evolution.is_keyframe_due(bytes.len()).then(|| evolution.keyframe());
@@ -165,11 +165,6 @@ impl LocalRun {
     pub fn fail(&mut self, reason: &str) -> Result<(), StoreError> {
         self.store.set_state(self.id, clock::unix_ms(), ExperimentState::Failed, reason)
     }
-}
-
-/// The same mean as in `evolution`.
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 #[cfg(test)]

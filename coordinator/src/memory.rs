@@ -4,7 +4,7 @@
 use std::fmt;
 
 use evolution::ALGORITHMS;
-use experiment_file::{Keeps, limits};
+use experiment_file::{AlgorithmDescription, Keeps, limits};
 
 use crate::store::Summary;
 
@@ -16,6 +16,8 @@ const BYTES_PER_GENE_OF_MATRIX: u64 = 48;
 const BYTES_PER_GENE_OF_POPULATION: u64 = 104;
 /// Bytes per entry of a matrix, including its copy, its decomposition and its text.
 const BYTES_PER_ENTRY: u64 = 96;
+/// The same for all matrices of emitters, only one of which is decomposed at a time.
+const BYTES_PER_ENTRY_OF_EMITTERS: u64 = BYTES_PER_ENTRY + 32 * limits::EMITTERS as u64;
 /// Bytes per trial: its fitness, the id of its worker, and a copy.
 const BYTES_PER_TRIAL: u64 = 32;
 /// Bytes per individual: pointers to its genes and results, its item.
@@ -28,10 +30,9 @@ const BYTES_PER_EXPERIMENT: u64 = 64 << 10;
 /// Estimated upper bound of an experiment's memory, bytes. An experiment of another release,
 /// which does not run, may count as nearly nothing.
 pub fn estimate(summary: &Summary, genotype_len: u64) -> u64 {
-    let algorithm = summary;
-    let description = ALGORITHMS.iter().find(|description| description.name == algorithm.algorithm);
+    let description = AlgorithmDescription::find(ALGORITHMS, &summary.algorithm);
     let keeps = description.map_or(Keeps::Population, |description| description.keeps);
-    let n_genes = algorithm.population_size.saturating_mul(genotype_len);
+    let n_genes = summary.population_size.saturating_mul(genotype_len);
     let state = match keeps {
         Keeps::Vectors => n_genes.saturating_mul(BYTES_PER_GENE),
         Keeps::Matrix => n_genes
@@ -41,16 +42,22 @@ pub fn estimate(summary: &Summary, genotype_len: u64) -> u64 {
         Keeps::Repertoire => {
             let of_elites = u64::from(limits::ELITES).saturating_mul(genotype_len);
             let of_elites = of_elites.min(limits::GENES_OF_REPERTOIRE);
-            n_genes.saturating_add(of_elites).saturating_mul(BYTES_PER_GENE)
+            let has_matrices = description.is_some_and(|found| found.genes_max.is_some());
+            let entries = genotype_len.saturating_mul(genotype_len);
+            let of_matrices = if has_matrices { entries } else { 0 };
+            n_genes
+                .saturating_add(of_elites)
+                .saturating_mul(BYTES_PER_GENE)
+                .saturating_add(of_matrices.saturating_mul(BYTES_PER_ENTRY_OF_EMITTERS))
         }
     };
-    let n_trials = algorithm.population_size.saturating_mul(algorithm.num_evaluations);
+    let n_trials = summary.population_size.saturating_mul(summary.num_evaluations);
     [
         state,
         n_trials
-            .saturating_add(algorithm.champion_trials.max(algorithm.judgement_trials))
+            .saturating_add(summary.champion_trials.max(summary.judgement_trials))
             .saturating_mul(BYTES_PER_TRIAL),
-        algorithm.population_size.saturating_mul(BYTES_PER_INDIVIDUAL),
+        summary.population_size.saturating_mul(BYTES_PER_INDIVIDUAL),
         CONFIG_COPIES.saturating_mul(summary.config_len),
         BYTES_PER_EXPERIMENT,
     ]

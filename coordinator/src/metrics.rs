@@ -4,9 +4,10 @@
 use swarm_telemetry::{Histogram, Metric, Scrape, metrics};
 use tokio::sync::oneshot;
 
+use engine::JobStats;
+
 use crate::{
     driver::{DriverEvent, EventSender, StatsSnapshot},
-    engine::JobStats,
     referee::Referee,
     runs::RunStats,
     server::calls::Calls,
@@ -37,7 +38,8 @@ metrics! {
     ITEMS_FAILED = Counter "swarm_items_failed_total" []
         "Items that a worker could not compute.";
     ITEMS_REQUEUED = Counter "swarm_items_requeued_total" []
-        "Items given to another worker because the first one failed, was lost or is in doubt.";
+        "Assignments that ended without a result because their worker left, was lost, stalled, went \
+         into quarantine, or failed while in doubt; also audits.";
     ITEMS_RECALLED = Counter "swarm_items_recalled_total" []
         "Items taken back from a worker because another one has the result, or computes it sooner.";
     EPISODES = Counter "swarm_episodes_total" []

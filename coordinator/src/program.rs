@@ -8,7 +8,7 @@ use std::{
     net::SocketAddr,
     path::PathBuf,
     process::ExitCode,
-    time::{Duration, SystemTime},
+    time::Duration,
 };
 
 use clap::{Parser, Subcommand};
@@ -19,8 +19,8 @@ use tracing::{error, info};
 
 use self::access_args::{AccessArgs, AccessInputError};
 use crate::{
-    Coordinator, CoordinatorConfig, RunError, StartError, health_check, limits::MEMORY_BUDGET_MIB,
-    referee,
+    Coordinator, CoordinatorConfig, RunError, StartError, clock, health_check,
+    limits::MEMORY_BUDGET_MIB, referee,
 };
 
 /// Coordinates the evolution of robot swarms: accepts experiment files, sends
@@ -179,12 +179,6 @@ async fn report_health(args: &Args) -> ExitCode {
     }
 }
 
-/// The present time, to compare with dates.
-#[expect(clippy::disallowed_methods, reason = "certificates expire by the clock")]
-fn now() -> SystemTime {
-    SystemTime::now()
-}
-
 async fn serve(args: &Args) -> anyhow::Result<()> {
     // First of all, so that no early signal is lost.
     let mut terminate = signal(SignalKind::terminate())?;
@@ -201,7 +195,7 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
         ..CoordinatorConfig::new(args.listen, args.data_dir.clone())
     })
     .await?;
-    let expiries = tokio::spawn(args.access.expiries().watch(now));
+    let expiries = tokio::spawn(args.access.expiries().watch(clock::today));
     let ended = tokio::select! {
         _ = terminate.recv() => Ok(()),
         _ = interrupt.recv() => Ok(()),

@@ -7,9 +7,10 @@ use experiment_file::{ExperimentConfig, limits};
 use sim_core::Simulation;
 use tokio::sync::OwnedSemaphorePermit;
 
+use engine::Batch;
+
 use crate::{
     driver::DriverEvent,
-    engine::Batch,
     limits::{EVALUATION_VALUES_MAX, TRIAL_VALUES_MAX},
     priority::Priority,
     runs::Evaluation,

@@ -1,9 +1,10 @@
 //! Explains the present activity of an experiment, or why it waits, from the engine and the
 //! store.
 
+use engine::JobActivity;
+
 use crate::{
     driver::DriverEvent,
-    engine::JobActivity,
     ids::ExperimentId,
     memory::Shortage,
     queries::{self, QueryError},

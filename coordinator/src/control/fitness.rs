@@ -6,9 +6,10 @@ use evolution::Genotype;
 use experiment_file::limits;
 use sim_core::TrialSet;
 
+use engine::Batch;
+
 use crate::{
-    driver::DriverEvent, engine::Batch, limits::EVALUATION_VALUES_MAX, priority::Priority,
-    runs::Evaluation,
+    driver::DriverEvent, limits::EVALUATION_VALUES_MAX, priority::Priority, runs::Evaluation,
 };
 
 use super::{Control, ControlError, experiment_files::ExperimentFiles};

@@ -30,7 +30,7 @@ pub enum WatchError {
 
 /// Sends an experiment's events from `from_sequence` on, past ones first, and ends after the
 /// event that ends the experiment. Dropping the receiver also ends it.
-pub fn watch(
+pub fn follow(
     store: SharedStore,
     shutdown: CancellationToken,
     id: ExperimentId,

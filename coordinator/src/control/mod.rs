@@ -1,7 +1,7 @@
 //! The operations that a running coordinator offers to clients: submit and steer experiments,
 //! evaluate genotypes, report the fleet's activity.
 //!
-//! It works on core types. Calls that only read are in [`queries`](model::queries).
+//! It works on core types. Calls that only read are in [`queries`].
 
 mod capacity;
 mod evaluate;
@@ -30,9 +30,10 @@ use experiment_file::ConfigError;
 use tokio::sync::{Semaphore, oneshot};
 use tokio_util::sync::CancellationToken;
 
+use engine::{EvaluationActivity, TimelineEntry, WorkerStatus};
+
 use crate::{
     driver::{DriverEvent, EventSender},
-    engine::{EvaluationActivity, TimelineEntry, WorkerStatus},
     ids::ExperimentId,
     limits::{EVALUATIONS_MAX, REQUESTS_LEN_MAX, UNFINISHED_MAX},
     memory::Shortage,
@@ -47,7 +48,7 @@ use requests::Requests;
 pub use evaluate::{CheckedEvaluation, EvaluationOrder};
 pub use explain::Explanation;
 pub use fitness::FitnessOrder;
-pub use follow::{WatchError, watch};
+pub use follow::{WatchError, follow};
 pub use placement::{Existing, Placement, place};
 pub use reopen::Reopening;
 pub use submit::Submitted;

@@ -90,6 +90,8 @@ impl Requests {
 mod tests {
     use std::sync::mpsc;
 
+    use futures_util::FutureExt as _;
+
     use super::*;
 
     fn requests() -> Requests {
@@ -123,13 +125,13 @@ mod tests {
         let (release, released) = mpsc::channel::<()>();
         let busy = requests.check(Client::default(), move |_| released.recv());
         let mut busy = Box::pin(busy);
-        assert!(is_pending(&mut busy).await);
+        assert!((&mut busy).now_or_never().is_none());
         let mut others = Vec::new();
         for _ in 1..CHECKS_MAX {
             others.push(requests.checks.wait(Client::default()).await);
         }
         let mut next = Box::pin(requests.check(Client::default(), |_| ()));
-        assert!(is_pending(&mut next).await, "there is no turn left");
+        assert!((&mut next).now_or_never().is_none(), "there is no turn left");
         release.send(()).unwrap();
         busy.await.unwrap().unwrap();
         next.await.unwrap();
@@ -156,17 +158,9 @@ mod tests {
         let (say, said) = mpsc::channel();
         let check = move |goes_on: &dyn Fn() -> bool| say.send(endless(goes_on));
         let mut checking = Box::pin(requests.check_within(Duration::MAX, Client::default(), check));
-        assert!(is_pending(&mut checking).await);
+        assert!((&mut checking).now_or_never().is_none());
         drop(checking);
         let ended = task::spawn_blocking(move || said.recv()).await.unwrap();
         assert_eq!(ended, Ok("was ended"));
-    }
-
-    /// Polls once.
-    async fn is_pending<T>(future: &mut std::pin::Pin<Box<impl Future<Output = T>>>) -> bool {
-        std::future::poll_fn(|context| {
-            std::task::Poll::Ready(future.as_mut().poll(context).is_pending())
-        })
-        .await
     }
 }

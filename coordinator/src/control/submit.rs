@@ -60,7 +60,7 @@ impl Control {
         let check = move |goes_on: &dyn Fn() -> bool| {
             let parent = match stored {
                 Some(stored) => {
-                    let evolution = stored.replay()?.after;
+                    let evolution = stored.repeat()?.after;
                     Some(Parent { experiment: stored.experiment, evolution })
                 }
                 None => None,

@@ -1,8 +1,6 @@
 //! Streams explanations of an experiment whenever its situation changes, and news of all
 //! experiments.
 
-use std::time::Duration;
-
 use tokio::{
     sync::{mpsc, watch},
     time::{sleep, timeout},
@@ -12,15 +10,11 @@ use tokio_util::sync::CancellationToken;
 use crate::{
     driver::DriverEvent,
     ids::ExperimentId,
-    limits::{NEWS_PAUSE, SITUATION_INTERVAL, WATCH_PATIENCE, WATCH_QUEUE_LEN},
+    limits::{BARRIER_AFTER, NEWS_PAUSE, SITUATION_INTERVAL, WATCH_PATIENCE, WATCH_QUEUE_LEN},
     store::ExperimentState,
 };
 
 use super::{Control, ControlError, Explanation};
-
-/// Time for which workers must have had a round's last items before the round counts as waiting
-/// for them.
-const LONG: Duration = Duration::from_secs(10);
 
 /// The parts of an explanation whose change leads to another message.
 #[derive(Debug, PartialEq)]
@@ -76,7 +70,7 @@ impl Situation {
 impl Stage {
     fn from_explanation(Explanation { activity, .. }: &Explanation) -> Self {
         let Some(batch) = &activity.batch else { return Self::None };
-        let is_long = batch.shares.iter().any(|share| share.oldest_for >= LONG);
+        let is_long = batch.shares.iter().any(|share| share.oldest_for >= BARRIER_AFTER);
         match (batch.n_items_queued, batch.shares.is_empty()) {
             (0, false) if is_long => Self::Barrier,
             (0, true) if batch.n_audits_waiting > 0 => Self::Audits,

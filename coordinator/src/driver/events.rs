@@ -3,11 +3,12 @@
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
+use engine::{
+    EvaluationActivity, Introduction, ItemResult, JobActivity, TimelineEntry, ToWorker,
+    WorkerStatus,
+};
+
 use crate::{
-    engine::{
-        EvaluationActivity, Introduction, ItemResult, JobActivity, TimelineEntry, ToWorker,
-        WorkerStatus,
-    },
     ids::{ExperimentId, WorkerId},
     memory::Shortage,
     runs::{Evaluation, Request, Runnable},

@@ -20,18 +20,19 @@ use std::{
 use swarm_telemetry::Histogram;
 use tokio::{
     sync::{mpsc, oneshot, watch},
-    task::JoinSet,
+    task::{self, JoinSet},
     time::MissedTickBehavior,
 };
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, error, info, warn};
 
+use engine::Verdict;
+use engine::{Assignments, Engine, EngineConfig, EvaluatedBatch, ToWorker};
+
 use crate::{
-    clock,
-    engine::{self, Assignments, Engine, EngineConfig, EvaluatedBatch, ToWorker},
-    failpoint,
+    clock, failpoint,
     ids::{EvaluationId, ExperimentId, JobId, QuestionId},
-    referee::{Referee, Verdict},
+    referee::Referee,
     runs::{self, Evaluation, Request, RequestId, Runnable, Runs},
     shared_store::SharedStore,
     store::{ExperimentState, QuarantinedWorker},
@@ -47,7 +48,7 @@ use workers::ConnectedWorkers;
 
 /// Longest time until the loop notices late work.
 const TICK_INTERVAL_MAX: Duration = Duration::from_millis(100);
-/// Genotypes of about this many bytes travel in one message.
+/// Bytes of genes in one message of items, counted also for items whose genes the worker draws.
 const ITEMS_LEN_MAX: usize = 1 << 20;
 
 /// The loop's state.
@@ -107,7 +108,7 @@ impl Driver {
     ) -> Self {
         let DriverConfig { engine: config, memory_budget, referee, quarantine, commit_duration } =
             config;
-        let mut engine = Engine::new(clock::now(), config);
+        let mut engine = Engine::new(clock::engine_now(), config);
         for QuarantinedWorker { name, reason } in quarantine {
             engine.on_quarantine_restored(&name, &reason);
         }
@@ -140,11 +141,11 @@ impl Driver {
                 Some(done) = self.tasks.join_next() => self.on_task_done(done),
                 (question, verdict) = self.questions.answer() => {
                     log_verdict(question, &verdict);
-                    self.engine.on_verdict(clock::now(), question, verdict);
+                    self.engine.on_verdict(clock::engine_now(), question, verdict);
                 }
                 _ = ticks.tick() => {
                     self.drop_abandoned_evaluations();
-                    self.engine.on_tick(clock::now());
+                    self.engine.on_tick(clock::engine_now());
                 }
             }
             self.carry_out_all();
@@ -161,7 +162,7 @@ impl Driver {
 
     fn on_event(&mut self, event: DriverEvent) {
         failpoint::reached("event");
-        let now = clock::now();
+        let now = clock::engine_now();
         match event {
             DriverEvent::WorkerJoined { introduction, link, reply } => {
                 self.on_worker_joined(introduction, link, reply);
@@ -254,7 +255,7 @@ impl Driver {
         }
     }
 
-    fn on_task_done(&mut self, done: Result<Done, tokio::task::JoinError>) {
+    fn on_task_done(&mut self, done: Result<Done, task::JoinError>) {
         match done {
             Ok(Done::Loaded(run, loaded)) => self.runs.on_loaded(run, loaded),
             Ok(Done::Concluded(run, conclusion)) => self.runs.on_concluded(run, conclusion),
@@ -291,7 +292,7 @@ impl Driver {
 
     fn carry_out(&mut self, command: runs::Command) {
         use runs::Command;
-        let now = clock::now();
+        let now = clock::engine_now();
         match command {
             Command::StartJob { job, name, spec, priority, is_paused } => {
                 self.engine.on_job_started(job, name, spec, priority);
@@ -318,7 +319,10 @@ impl Driver {
             Command::Conclude { run, config, round, evaluated } => {
                 self.tasks.spawn(tasks::conclude(run, config, round, evaluated));
             }
-            Command::Commit { run, config, ready } => {
+            Command::Commit { run, config, ready, link } => {
+                if let Some(link) = link {
+                    task::spawn_blocking(move || link.hash_genes());
+                }
                 self.tasks.spawn(tasks::commit(run, config, *ready, self.disk.clone()));
             }
             Command::WriteChange { experiment, change } => {
@@ -350,8 +354,8 @@ impl Driver {
                     %worker, %job, generation = trial_set.generation(), trials = trial_set.kind(),
                     items = items.len(), "items assigned"
                 );
-                let genotype_len = size_of_val(items[0].genotype.as_slice()).max(1);
-                for items in items.chunks((ITEMS_LEN_MAX / genotype_len).max(1)) {
+                let genotype_bytes = size_of_val(items[0].genotype.as_slice()).max(1);
+                for items in items.chunks((ITEMS_LEN_MAX / genotype_bytes).max(1)) {
                     let message = Assignments { job, trial_set, output, items: items.to_vec() };
                     self.send(worker, ToWorker::Assignments(message));
                 }

@@ -4,12 +4,9 @@ use std::{collections::VecDeque, future::pending};
 
 use tokio::{task::JoinSet, time::timeout};
 
-use crate::{
-    ids::QuestionId,
-    limits::REFEREE_TIMEOUT,
-    referee::{Referee, RefereeRequest, Verdict},
-    text::printable,
-};
+use engine::{RefereeRequest, Verdict};
+
+use crate::{ids::QuestionId, limits::REFEREE_TIMEOUT, referee::Referee, text::printable};
 
 /// The waiting questions, and the one that the referee computes.
 #[derive(Debug)]

@@ -1,10 +1,8 @@
 //! Statistics for the metrics endpoint.
 
-use crate::{
-    clock,
-    engine::{FleetStats, JobStats},
-    runs::RunStats,
-};
+use engine::{FleetStats, JobStats};
+
+use crate::{clock, runs::RunStats};
 
 use super::Driver;
 
@@ -24,6 +22,6 @@ impl Driver {
             let work = self.engine.job_stats(run.experiment.into());
             (run, work)
         });
-        StatsSnapshot { runs: runs.collect(), fleet: self.engine.fleet_stats(clock::now()) }
+        StatsSnapshot { runs: runs.collect(), fleet: self.engine.fleet_stats(clock::engine_now()) }
     }
 }

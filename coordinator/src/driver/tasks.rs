@@ -10,10 +10,10 @@ use tokio::task;
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
 
+use engine::EvaluatedBatch;
+
 use crate::{
-    clock,
-    engine::EvaluatedBatch,
-    failpoint,
+    clock, failpoint,
     ids::ExperimentId,
     runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId},
     shared_store::{Retry, SharedStore, Written},

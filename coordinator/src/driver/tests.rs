@@ -2,8 +2,9 @@
 
 use std::fs;
 
+use engine::{Introduction, ItemResult, NamePattern};
+
 use crate::{
-    engine::{Introduction, ItemResult, NamePattern},
     ids::WorkerId,
     referee::RefereeProgram,
     store::{ExperimentRecord, Store},

@@ -5,11 +5,9 @@ use std::collections::BTreeMap;
 use tokio::sync::oneshot;
 use tracing::{info, warn};
 
-use crate::{
-    clock,
-    engine::{Introduction, ToWorker},
-    ids::WorkerId,
-};
+use engine::{Introduction, ToWorker};
+
+use crate::{clock, ids::WorkerId};
 
 use super::{Driver, WorkerLink};
 
@@ -31,7 +29,7 @@ impl Driver {
         reply: oneshot::Sender<WorkerId>,
     ) {
         let Introduction { name, version, n_slots, experiments, .. } = introduction.clone();
-        let id = self.engine.on_worker_joined(clock::now(), introduction);
+        let id = self.engine.on_worker_joined(clock::engine_now(), introduction);
         // The worker is welcomed before it gets work, because commands are carried out after
         // this.
         self.workers
@@ -53,12 +51,12 @@ impl Driver {
             worker.is_draining = true;
             info!(worker = %id, name = worker.name, "worker is draining");
         }
-        self.engine.on_draining(clock::now(), id);
+        self.engine.on_draining(clock::engine_now(), id);
         self.fleet_news.send_modify(|count| *count += 1);
     }
 
     pub(super) fn on_worker_left(&mut self, id: WorkerId, reason: &str) {
-        let n_items_requeued = self.engine.on_worker_left(clock::now(), id);
+        let n_items_requeued = self.engine.on_worker_left(clock::engine_now(), id);
         self.forget_worker(id, reason, n_items_requeued);
     }
 

@@ -20,7 +20,9 @@ use tokio::{
 };
 use tracing::warn;
 
-use super::{RefereeProgram, RefereeRequest, Verdict, stream::Arrived};
+use engine::{RefereeRequest, Verdict};
+
+use super::{RefereeProgram, stream::Arrived};
 use crate::{
     codec,
     ids::{EvaluationId, JobId},

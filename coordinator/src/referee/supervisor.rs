@@ -7,7 +7,9 @@ use std::{
 
 use tokio::{task::JoinSet, time::sleep};
 
-use super::{RefereeProgram, RefereeRequest, RefereeStats, Verdict, process::Process};
+use engine::{RefereeRequest, Verdict};
+
+use super::{RefereeProgram, RefereeStats, process::Process};
 use crate::clock;
 
 /// Evaluates items in a process of its own, one at a time. Clones share the process;

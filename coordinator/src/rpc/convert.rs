@@ -6,17 +6,11 @@ use sim_core::Output;
 use swarm_proto::v1::{self, WorkResponse, item_result::Outcome, work_response::Message};
 use tonic::Status;
 
-use crate::{
-    codec,
-    control::ControlError,
-    engine::{
-        Assignment, Assignments, BatchActivity, EvaluationActivity, ItemResult, ToWorker,
-        WorkerStatus,
-    },
-    ids::AssignmentId,
-    priority::Priority,
-    text::printable,
+use engine::{
+    Assignment, Assignments, BatchActivity, EvaluationActivity, ItemResult, ToWorker, WorkerStatus,
 };
+
+use crate::{codec, control::ControlError, ids::AssignmentId, priority::Priority, text::printable};
 
 /// The durations in `Welcome`.
 #[derive(Debug, Clone, Copy)]

@@ -106,7 +106,7 @@ impl Experiments {
         let id = ExperimentId(experiment_id);
         self.store.read(move |store| queries::experiment(store, id)).await?;
         let (store, shutdown) = (self.store.clone(), self.shutdown.clone());
-        let events = control::watch(store, shutdown, id, from_sequence);
+        let events = control::follow(store, shutdown, id, from_sequence);
         let responses = ReceiverStream::new(events).map(|event| {
             let event = Some(event?.into());
             Ok(WatchExperimentResponse { event })

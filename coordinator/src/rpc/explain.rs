@@ -7,11 +7,9 @@ use swarm_proto::v1::{
     ExplainExperimentResponse, HeldItems, RefereeQuestion, Round, WithheldWorker,
 };
 
-use crate::{
-    control::Explanation,
-    engine::{self, BatchActivity},
-    ids::JobId,
-};
+use engine::BatchActivity;
+
+use crate::{control::Explanation, ids::JobId};
 
 /// An explanation for clients.
 pub fn explanation(explanation: Explanation) -> ExplainExperimentResponse {

@@ -14,10 +14,11 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Status};
 
 use super::*;
+use engine::EngineConfig;
+
 use crate::{
     control::Control,
     driver::{self, Driver, DriverConfig},
-    engine::EngineConfig,
     limits::{WATCH_PATIENCE, WATCH_QUEUE_LEN},
     metrics::Instruments,
     referee::{Referee, RefereeProgram},

@@ -8,7 +8,7 @@ use std::{
 
 use futures_util::stream::unfold;
 use swarm_proto::{
-    ITEMS_PER_SLOT_MAX, PROTOCOL_VERSION, SLOTS_MAX, WORKER_NAME_LEN_MAX,
+    PROTOCOL_VERSION, SLOTS_MAX, WORKER_NAME_LEN_MAX,
     v1::{
         Hello, WorkRequest, WorkResponse, work_request::Message,
         worker_service_server::WorkerService,
@@ -21,14 +21,15 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 use tracing::warn;
 
+use engine::{Introduction, NamePattern};
+
 use crate::{
     byte_budget::ByteBudget,
     clock,
     driver::{DriverEvent, EventSender, WorkerLink, WorkerMessage},
-    engine::{Introduction, NamePattern},
     ids::WorkerId,
     limits::{
-        HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, SHORT_LEN, WORKER_OUTBOX_SLACK,
+        HELLO_TIMEOUT, ITEMS_PER_SLOT_MAX, RESULTS_PER_MESSAGE_MAX, SHORT_LEN, WORKER_OUTBOX_SLACK,
         WORKER_OUTFLOW_LEN_MAX,
     },
     text::printable,

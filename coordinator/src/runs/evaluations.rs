@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use crate::{engine::Batch, ids::EvaluationId, priority::Priority};
+use engine::Batch;
+
+use crate::{ids::EvaluationId, priority::Priority};
 
 use super::{Command, Runs};
 

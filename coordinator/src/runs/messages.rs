@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use experiment_file::ExperimentConfig;
 
+use engine::{Batch, EvaluatedBatch};
+use evolution::NextLink;
+
 use crate::{
-    engine::{Batch, EvaluatedBatch},
     ids::{EvaluationId, ExperimentId, JobId},
     memory::Shortage,
     priority::Priority,
@@ -89,6 +91,8 @@ pub enum Command {
         config: Arc<ExperimentConfig>,
         /// The generation, without its next round.
         ready: Box<ReadyToCommit>,
+        /// The link of the generation after it, whose genes there is time to hash now.
+        link: Option<Arc<NextLink>>,
     },
     /// Store a change and report [`Runs::on_change_written`](super::Runs::on_change_written).
     WriteChange {

@@ -42,8 +42,9 @@ use std::{
     sync::Arc,
 };
 
+use engine::{Batch, EvaluatedBatch};
+
 use crate::{
-    engine::{Batch, EvaluatedBatch},
     ids::{EvaluationId, ExperimentId},
     memory::Shortage,
     store::ExperimentState,
@@ -53,7 +54,7 @@ pub use change_queue::{Change, PendingChange, Request, RequestId};
 pub use evaluations::Evaluation;
 pub use messages::{Command, CommitOutcome, RunId};
 pub use round::{
-    Next, ReadyToCommit, Round, completion, describe, describe_judgement, describe_repertoire,
+    Next, ReadyToCommit, Round, completion, describe, describe_elites, describe_judgement,
 };
 pub use runnable::Runnable;
 pub use stats::RunStats;
@@ -363,8 +364,9 @@ impl Runs {
             is_last: ready.completed.is_some(),
         });
         let next = ready.next.take();
+        let link = next.as_ref().and_then(Round::link);
         let (config, run) = (Arc::clone(&run.config), run.id(id));
-        self.commands.push_back(Command::Commit { run, config, ready });
+        self.commands.push_back(Command::Commit { run, config, ready, link });
         if let Some(round) = next {
             self.evaluate(id, round);
         }

@@ -1,6 +1,6 @@
 //! Rounds, and their conclusions. A round is a generation, a re-evaluation of candidates for the
-//! champion on held-out trials, or at the end the judgement of the champion and of all elites on trials
-//! that select nothing.
+//! champion on held-out trials, or at the end the judgement of the champion and of all elites on
+//! trials that select nothing.
 
 use std::sync::Arc;
 
@@ -8,10 +8,12 @@ use experiment_file::ExperimentConfig;
 use sim_core::TrialSet;
 use swarm_telemetry::number;
 
-use crate::{engine::EvaluatedBatch, store::GenerationRecord};
+use engine::EvaluatedBatch;
+
+use crate::store::GenerationRecord;
 use evolution::{
-    Champion, ChampionSource, End, Evolution, EvolutionError, GenerationSummary, Judgement, Learnt,
-    Population, Reevaluation, Told,
+    Champion, ChampionSource, End, Evolution, EvolutionError, Front, GenerationSummary, Judgement,
+    Learnt, NextLink, Population, Reevaluation, Told,
 };
 
 /// A batch that the fleet evaluates, with its purpose.
@@ -22,8 +24,8 @@ pub enum Round {
     /// Candidates on a block of held-out trials, after a generation that evolution has learnt
     /// from and that is not committed yet.
     Reevaluation(Box<UpdatedEvolution>, Box<Reevaluation>),
-    /// The champion and the elites of a repertoire on trials that select nothing, after the last generation, which is
-    /// not committed yet.
+    /// The champion and the elites of a repertoire on trials that select nothing, after the last
+    /// generation, which is not committed yet.
     Judgement(Box<ReadyToCommit>, Box<Judgement>),
 }
 
@@ -103,6 +105,14 @@ impl Round {
         }
     }
 
+    /// The generation's link of the digest chain.
+    pub fn link(&self) -> Option<Arc<NextLink>> {
+        match self {
+            Self::Generation(_, generation) => Some(generation.link()),
+            Self::Reevaluation(..) | Self::Judgement(..) => None,
+        }
+    }
+
     /// Descriptors of each trial.
     pub fn n_descriptors(&self) -> usize {
         match self {
@@ -174,7 +184,7 @@ impl Round {
                 let (champion, digest) = judgement.decide(&evaluated.values);
                 ready.notices.extend(evaluated.notices.iter().cloned());
                 ready.notices.push(describe_judgement(&champion));
-                ready.notices.extend(describe_repertoire(&ready.evolution, &ready.told.end));
+                ready.notices.extend(describe_elites(&ready.evolution, &ready.told.end));
                 ready.digest = digest.to_string();
                 ready.champion = Some(champion);
                 Ok(Next::Commit(ready))
@@ -185,7 +195,7 @@ impl Round {
 
 impl UpdatedEvolution {
     fn is_scheduled(&self, config: &ExperimentConfig) -> bool {
-        self.evolution.n_generations().is_multiple_of(config.algorithm.champion_every)
+        config.algorithm.compares_after(self.evolution.n_generations())
     }
 
     /// `with_champion`: evolution after a re-evaluation. An extended run does not continue from the
@@ -279,9 +289,30 @@ pub fn describe_judgement(champion: &Champion) -> String {
     }
 }
 
-/// Describes the repertoire at the end of a run by its corrected figures, for the log; `None` without
-/// a repertoire.
-pub fn describe_repertoire(evolution: &Evolution, end: &End) -> Option<String> {
+/// Describes the repertoire or the front at the end of a run by its corrected figures, for the log;
+/// `None` without one.
+pub fn describe_elites(evolution: &Evolution, end: &End) -> Option<String> {
+    evolution
+        .front(end)
+        .map_or_else(|| describe_repertoire(evolution, end), |front| Some(describe_front(&front)))
+}
+
+fn describe_front(front: &Front<'_>) -> String {
+    let n_elites = front.elites.len();
+    let figures = front.figures(None).and_then(|figures| Some((figures.stay?, figures)));
+    let Some((stay, figures)) = figures else {
+        return format!("front: none of {n_elites} elites has finite values in every trial");
+    };
+    let reference: Vec<String> = figures.reference.iter().map(|value| number(*value, 6)).collect();
+    format!(
+        "front judged: hypervolume {} up to ({}), and {:.0} % of {n_elites} elites stay on it",
+        number(figures.hypervolume, 6),
+        reference.join(", "),
+        100.0 * stay,
+    )
+}
+
+fn describe_repertoire(evolution: &Evolution, end: &End) -> Option<String> {
     let repertoire = evolution.elites(end)?;
     let n_elites = repertoire.elites.len();
     let Some(figures) = repertoire.figures() else {

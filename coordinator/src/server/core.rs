@@ -13,10 +13,11 @@ use super::{
     gate::Gate,
     services::{self, Room, Services},
 };
+use engine::EngineConfig;
+
 use crate::{
     control::Control,
     driver::{self, Driver, DriverConfig, EventSender},
-    engine::EngineConfig,
     limits::{BUNDLES_MAX, RECONSTRUCTIONS_MAX, REFEREE_IDLE_TIME, SHUTDOWN_GRACE},
     metrics::{Instruments, Source},
     referee::Referee,

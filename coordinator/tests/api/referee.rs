@@ -10,7 +10,8 @@ use std::{
     time::Duration,
 };
 
-use coordinator::referee::{Referee, RefereeProgram, RefereeRequest, Verdict};
+use coordinator::referee::{Referee, RefereeProgram};
+use engine::{RefereeRequest, Verdict};
 use experiment_file::{DescriptorConfig, ExperimentConfig, Summarises};
 use sim_core::{Output, Simulation, TrialSet};
 use tempfile::TempDir;

@@ -1,7 +1,7 @@
 //! Runs in which all, or nearly all, individuals have equal fitness.
 
 use super::{super::round::*, world};
-use crate::engine::EvaluatedBatch;
+use engine::EvaluatedBatch;
 
 /// The notices of a run, and why it fails if it does, with the given fitness per individual.
 fn run(name: &str, generations: u64, fitness: fn(usize) -> f64) -> (Vec<String>, Option<String>) {
