@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use engine::{Fate, TimelineEntry};
 use experiment_file::Seed;
 use model::wire::state_name;
 use serde::Serialize;
@@ -9,8 +10,6 @@ use serde_json::{Value, json};
 use swarm_proto::v1::{
     CompletedGeneration, Event, Experiment, ExperimentState, Worker, event::Kind,
 };
-
-use crate::source::Assignment;
 
 /// An experiment in a list.
 #[derive(Debug, Serialize)]
@@ -84,8 +83,9 @@ impl ExperimentAnswer {
     }
 }
 
-/// A generation as a row of a chart, without keys because a page gets thousands: number, best, mean, min, standard deviation, duration
-/// in ms, episodes, time of completion in ms since 1970 UTC.
+/// A generation as a row of a chart, without keys because a page gets thousands: number, best,
+/// mean, min, standard deviation, duration in ms, episodes, time of completion in ms since 1970
+/// UTC. `generation-row.js` names the columns.
 pub type GenerationRow = (u64, f64, f64, f64, f64, u64, u64, u64);
 
 /// A generation; none if the message is incomplete.
@@ -166,29 +166,27 @@ impl From<Worker> for WorkerAnswer {
 /// Assignments as rows, which name their workers and batches by place: worker, batch,
 /// individual, first trial, trial after the last, time since it was given, time since its end
 /// (or 0) and time of computing in µs, fate.
-pub fn timeline(assignments: Vec<Assignment>) -> Value {
+pub fn timeline(entries: Vec<TimelineEntry>) -> Value {
     let mut workers: BTreeMap<(u64, String), usize> = BTreeMap::new();
     let mut batches: BTreeMap<(String, Option<u64>), usize> = BTreeMap::new();
-    let mut rows = Vec::with_capacity(assignments.len());
-    for assignment in assignments {
+    let mut rows = Vec::with_capacity(entries.len());
+    for entry in entries {
         let n = workers.len();
-        let worker = *workers.entry((assignment.worker_id, assignment.worker_name)).or_insert(n);
+        let worker = *workers.entry((entry.worker.0, entry.name.to_string())).or_insert(n);
         let n = batches.len();
-        let batch = *batches.entry((assignment.batch, assignment.experiment)).or_insert(n);
-        let [given, ended, busy] = [assignment.assigned_for, assignment.ended_for, assignment.busy]
+        let experiment = entry.job.experiment().map(|id| id.0);
+        let batch = *batches.entry((entry.batch(), experiment)).or_insert(n);
+        let [given, ended, busy] = [entry.assigned_for, entry.ended_for, entry.busy]
             .map(|duration| duration.as_micros() as u64);
-        let (first, end) = (assignment.trials.start, assignment.trials.end);
-        rows.push(json!([
-            worker,
-            batch,
-            assignment.individual,
-            first,
-            end,
-            given,
-            ended,
-            busy,
-            assignment.fate
-        ]));
+        let (first, end) = (entry.trials.start, entry.trials.end);
+        let fate = match entry.fate {
+            Fate::Unanswered => "unanswered",
+            Fate::Computed => "computed",
+            Fate::TakenBack => "taken-back",
+            Fate::Failed => "failed",
+            Fate::Lost => "lost",
+        };
+        rows.push(json!([worker, batch, entry.individual, first, end, given, ended, busy, fate]));
     }
     json!({ "workers": by_place(workers), "batches": by_place(batches), "assignments": rows })
 }

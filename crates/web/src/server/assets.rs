@@ -64,6 +64,7 @@ pub fn routes() -> Router {
         .route("/fleet", page("page-fleet.js"))
         .route("/replay/{*address}", page("page-replay.js"))
         .route("/verify", page("page-verify.js"))
+        .route("/demo", page("page-demo.js"))
         .route("/login", get(|| async { login() }))
         .route("/assets/{version}/{name}", get(asset))
         .fallback(|| async { (StatusCode::NOT_FOUND, missing()) })

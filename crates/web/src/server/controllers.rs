@@ -10,6 +10,7 @@ use axum::{
 };
 use controller_c::{About, Episodes, ExportError};
 use evolution::Digest;
+use replay::WhatIf;
 use sim_core::{FINGERPRINT, TrialSet};
 
 use super::{
@@ -17,7 +18,6 @@ use super::{
     problem::{Path, Problem},
     replays::{Subject, stopping, work},
 };
-use crate::what_if::WhatIf;
 
 /// Largest size of a recorded episode, bytes.
 const LEN_MAX: usize = 64_000_000;

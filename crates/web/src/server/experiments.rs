@@ -9,12 +9,13 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use evolution::{ALGORITHMS, Operator};
-use experiment_file::{AlgorithmDescription, Keeps};
+use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom};
 use model::queries::Families;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use swarm_proto::v1::{
-    GetRepertoireRequest, ListDynamicsRequest, ListEventsRequest, ListGenerationsRequest,
+    GetFrontRequest, GetRepertoireRequest, ListDynamicsRequest, ListEventsRequest,
+    ListGenerationsRequest,
 };
 
 use super::{
@@ -36,7 +37,7 @@ pub struct From {
 }
 
 /// One experiment, its file, its champion if any, and whether its individuals have parents in the
-/// generation before, or are a repertoire.
+/// generation before, or are a repertoire or a front.
 pub async fn one(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -54,13 +55,15 @@ pub async fn one(
             "selection": champion.held_out.map(|selection| selection.mean),
         })
     });
-    let keeps = found.experiment.as_ref().and_then(|experiment| {
-        let algorithm = AlgorithmDescription::find(ALGORITHMS, &experiment.algorithm);
-        algorithm.map(|algorithm| algorithm.keeps)
-    });
+    let algorithm = found
+        .experiment
+        .as_ref()
+        .and_then(|experiment| AlgorithmDescription::find(ALGORITHMS, &experiment.algorithm));
+    let learns_from = |what| algorithm.is_some_and(|algorithm| algorithm.learns_from == what);
     Ok(Json(json!({
-        "has_parents": keeps == Some(Keeps::Population),
-        "has_repertoire": keeps == Some(Keeps::Repertoire),
+        "has_parents": algorithm.is_some_and(|algorithm| algorithm.keeps == Keeps::Population),
+        "has_repertoire": learns_from(LearnsFrom::Descriptors),
+        "has_front": learns_from(LearnsFrom::Aims),
         "experiment": found.experiment.map(|experiment| {
             ExperimentAnswer::new(experiment, shared.control.is_some())
         }),
@@ -135,6 +138,38 @@ pub async fn repertoire(
         "axes": axes.collect::<Vec<_>>(),
         "n_elites": found.elites.len(),
         "corrected": corrected,
+        "shown": shown.collect::<Vec<_>>(),
+    })))
+}
+
+/// The latest front: its aims, its figures, and for each elite on it fitness, aims, and the
+/// generation and index of its birth. Fitness and aims are judged ones, if there are any.
+pub async fn front(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+) -> Result<Json<Value>, Problem> {
+    let request = GetFrontRequest { experiment_id: id, generation: None, reference: Vec::new() };
+    let found = shared.reader.get_front(request).await?;
+    let shown = found.shown.iter().filter_map(|&place| found.elites.get(place as usize));
+    let shown = shown.map(|elite| {
+        let (fitness, aims) = match &elite.judged {
+            Some(judged) => (judged.fitness, &judged.descriptors),
+            None => (elite.fitness, &elite.descriptors),
+        };
+        json!([fitness, aims, elite.generation, elite.individual])
+    });
+    let aims = found
+        .aims
+        .iter()
+        .map(|aim| json!({"measure": aim.measure, "of": aim.of, "direction": aim.direction}));
+    let figures = found.figures.as_ref().map(
+        |of| json!({"hypervolume": of.hypervolume, "reference": of.reference, "stay": of.stay}),
+    );
+    Ok(Json(json!({
+        "generation": found.generation,
+        "aims": aims.collect::<Vec<_>>(),
+        "n_elites": found.elites.len(),
+        "figures": figures,
         "shown": shown.collect::<Vec<_>>(),
     })))
 }

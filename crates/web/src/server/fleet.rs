@@ -10,6 +10,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use experiment_file::Seed;
+use model::wire::round_name;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use swarm_proto::v1::{ExplainExperimentResponse, ForkPoint, Round, SubmitExperimentRequest};
@@ -111,12 +112,7 @@ fn explanation(response: ExplainExperimentResponse) -> Value {
     };
     json!({
         "round": response.round.map(|round| json!({
-            "generation": round.generation,
-            "kind": match (round.held_out, round.judgement) {
-                (true, _) => "re-evaluation of candidates",
-                (_, true) => "judgement of the champion",
-                _ => "generation",
-            },
+            "name": round_name(&round),
             "episodes": round.episodes,
             "episodes_left": round.episodes_left,
             "items_queued": round.items_queued,

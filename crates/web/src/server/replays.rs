@@ -8,20 +8,16 @@ use axum::{
     http::{StatusCode, header::CONTENT_TYPE},
     response::{IntoResponse, Response},
 };
-use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
+use replay::{Episode, Judged, Replay, Trials, WhatIf};
+use serde::Serialize;
 use sim_core::{FINGERPRINT, Simulation, TrialSet};
-use swarm_proto::v1::GetChampionResponse;
+use swarm_proto::v1::{GetChampionResponse, JudgedFitness};
 use tokio::sync::{Mutex, OnceCell};
 
 use super::{
     Shared,
     problem::{Path, Problem, Query},
-};
-use crate::{
-    replay::{Episode, Replay},
-    trials::Trials,
-    what_if::WhatIf,
 };
 
 /// Cached judgements whose trials were simulated again, by experiment and generation.
@@ -77,12 +73,7 @@ impl Subject {
 
     /// The experiment with the requested changes.
     pub fn compile(&self, what_if: &WhatIf) -> Result<(ExperimentConfig, Simulation), Problem> {
-        let bad = |error: &dyn std::fmt::Display| Problem::bad(error.to_string());
-        let config = ExperimentConfig::from_json(&self.config_json, "", ALGORITHMS);
-        let (config, _) = config.map_err(|error| bad(&error))?;
-        let config = what_if.apply(config).map_err(|error| bad(&error))?;
-        let simulation = Simulation::compile(&config).map_err(|error| bad(&error))?;
-        Ok((config, simulation))
+        what_if.compile(&self.config_json).map_err(|error| Problem::bad(error.to_string()))
     }
 
     /// The trials of its judgement, or else of its generation.
@@ -91,13 +82,15 @@ impl Subject {
         let Some(judged) = judged.filter(|judged| judged.trials > 0) else {
             return Ok(Trials::of_generation(*generation, trial_fitness.clone()));
         };
-        let known = shared.judgements.of_generation(self.experiment, judged.generation).await;
+        let JudgedFitness { mean, low, high, trials, generation } = judged;
+        let judged = Judged { generation, trials, mean, interval: (low, high) };
+        let known = shared.judgements.of_generation(self.experiment, generation).await;
         let subject = self.clone();
         let trials = known.get_or_try_init(|| {
             work(shared, move |keep_going| {
                 let (_, simulation) = subject.compile(&WhatIf::default())?;
                 let genotype = &subject.individual.genotype;
-                Trials::of_judgement(&simulation, genotype, &judged, keep_going)
+                Trials::of_judgement(&simulation, genotype, judged, keep_going)
                     .map_err(|error| Problem::bad(error.to_string()))?
                     .ok_or_else(stopping)
             })
@@ -134,6 +127,37 @@ pub async fn trials(
     Path(address): Path<String>,
 ) -> Result<Json<Trials>, Problem> {
     Ok(Json(Subject::find(&shared, &address).await?.trials(&shared).await?))
+}
+
+/// The individual at an address, for a page that simulates it.
+#[derive(Debug, Serialize)]
+pub struct Individual {
+    /// The message of pages to the simulator for browsers.
+    played: Played,
+    genotype: Vec<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Played {
+    /// The experiment file.
+    config: String,
+    name: String,
+    generation: u64,
+    /// Worlds and trial of the unchanged episode.
+    trials: TrialSet,
+    trial: u32,
+}
+
+/// The individual at an address, and its unchanged episode.
+pub async fn individual(
+    State(shared): State<Shared>,
+    Path(address): Path<String>,
+) -> Result<Json<Individual>, Problem> {
+    let subject = Subject::find(&shared, &address).await?;
+    let (trials, trial) = world(&shared, &subject, &WhatIf::default()).await?;
+    let Subject { config_json: config, individual, name, .. } = subject;
+    let played = Played { config, name, generation: individual.generation, trials, trial };
+    Ok(Json(Individual { played, genotype: individual.genotype }))
 }
 
 /// The episode of the genotype at an address, with the requested changes.

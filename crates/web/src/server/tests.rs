@@ -123,7 +123,7 @@ async fn other_sites_change_nothing() {
 
 #[tokio::test]
 async fn browsers_load_nothing_from_elsewhere() {
-    for path in ["/", "/experiment/1", "/replay/1@0/3", "/verify", "/login"] {
+    for path in ["/", "/experiment/1", "/replay/1@0/3", "/verify", "/demo", "/login"] {
         let page = answer(HERE, None, get(path, HERE, "")).await;
         let policy = page.headers()["content-security-policy"].to_str().unwrap().to_owned();
         let scripts = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval' 'sha256-";
@@ -146,6 +146,13 @@ async fn every_error_is_one_line() {
         ("/api/experiments/-1/events", StatusCode::BAD_REQUEST, "an experiment has a number"),
         ("/api/experiments/1/live?from=x", StatusCode::BAD_REQUEST, "from"),
         ("/api/experiments/1/families?every=0", StatusCode::BAD_REQUEST, "every"),
+        ("/api/individual/1", StatusCode::CONFLICT, "has no champion yet"),
+        ("/api/individual/x", StatusCode::BAD_REQUEST, "names no genotype"),
+        (
+            "/api/replay/1?interventions=5:robot:1:dance",
+            StatusCode::BAD_REQUEST,
+            "is no intervention",
+        ),
         ("/api/replay/1?robots=many", StatusCode::BAD_REQUEST, "robots"),
         ("/api/replay/1?colour=red", StatusCode::BAD_REQUEST, "colour"),
         ("/api/nothing", StatusCode::NOT_FOUND, "there is nothing at /nothing"),

@@ -7,6 +7,9 @@ use experiment_file::{
 };
 use serde::Deserialize;
 use serde_json::{from_value, json};
+use sim_core::{InterventionError, Simulation, TrialSet};
+
+use crate::Interventions;
 
 /// Changes of an episode; `None` keeps the value of the experiment.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -29,11 +32,54 @@ pub struct WhatIf {
     pub inhibit: Option<String>,
     /// A perturbation with its default parameters: `leader_failure` or `topology_switch`.
     pub perturb: Option<String>,
+    /// Changes in the middle of the episode.
+    pub interventions: Interventions,
+}
+
+/// Why changes are refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WhatIfError {
+    /// The changed experiment is not valid.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Interventions do not fit it.
+    #[error(transparent)]
+    Interventions(#[from] InterventionError),
 }
 
 impl WhatIf {
+    /// Reads the query of an address.
+    pub fn from_query(query: &str) -> Result<Self, String> {
+        serde_urlencoded::from_str(query).map_err(|error| error.to_string())
+    }
+
+    /// Worlds and trial of the changed episode of an individual of a generation. `set` and `trial`:
+    /// those without changes.
+    pub fn world(&self, generation: u64, set: TrialSet, trial: u32) -> (TrialSet, u32) {
+        match (self.judged, set) {
+            (Some(judged), TrialSet::Judgement(_)) => (set, judged),
+            _ if self.generation.is_none() && self.trial.is_none() => (set, trial),
+            _ => {
+                let generation = self.generation.unwrap_or(generation);
+                (TrialSet::Generation(generation), self.trial.unwrap_or_default())
+            }
+        }
+    }
+
+    /// Reads and compiles an experiment file with the changes.
+    pub fn compile(
+        &self,
+        config_json: &str,
+    ) -> Result<(ExperimentConfig, Simulation), WhatIfError> {
+        let (config, _) = ExperimentConfig::from_json(config_json, "", ALGORITHMS)?;
+        let config = self.apply(config)?;
+        let simulation = Simulation::compile(&config)?;
+        let simulation = simulation.with_interventions(self.interventions.0.clone())?;
+        Ok((config, simulation))
+    }
+
     /// The experiment with the changes, checked like any file.
-    pub fn apply(&self, mut config: ExperimentConfig) -> Result<ExperimentConfig, ConfigError> {
+    fn apply(&self, mut config: ExperimentConfig) -> Result<ExperimentConfig, ConfigError> {
         config.seed = self.seed.unwrap_or(config.seed);
         let algorithm = &mut config.algorithm;
         algorithm.evaluation_steps = self.steps.unwrap_or(algorithm.evaluation_steps);
@@ -103,6 +149,29 @@ mod tests {
         assert_eq!((robot.num_instances, changed.algorithm.evaluation_steps), (7, 12));
         assert_eq!(robot.perturbations.stimuli_inhibition[0].affected_robots, 7);
         assert!(robot.perturbations.leader_failure.is_some());
+    }
+
+    #[test]
+    fn a_query_names_changes_and_worlds() {
+        let played = (TrialSet::Judgement(7), 3);
+        let world = |query| WhatIf::from_query(query).unwrap().world(5, played.0, played.1);
+        assert_eq!(world("robots=7&interventions=1:robot:0:mute"), played);
+        assert_eq!(world("judged=5"), (TrialSet::Judgement(7), 5));
+        assert_eq!(world("trial=2"), (TrialSet::Generation(5), 2));
+        assert_eq!(world("generation=4"), (TrialSet::Generation(4), 0));
+        for wrong in ["robots=many", "weather=rain", "interventions=1:robot"] {
+            assert!(WhatIf::from_query(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn interventions_must_fit_the_changed_experiment() {
+        let text = include_str!("../../../configs/quickstart.json");
+        let compile = |query| WhatIf::from_query(query).unwrap().compile(text).map(|_| ());
+        assert_eq!(compile("interventions=50:robot:4:mute"), Ok(()));
+        assert_eq!(compile("robots=9&interventions=50:robot:8:mute"), Ok(()));
+        let error = compile("steps=50&interventions=50:robot:4:mute").unwrap_err();
+        assert_eq!(error.to_string(), "step 50: the episode has the steps 0 to 49");
     }
 
     #[test]

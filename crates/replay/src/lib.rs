@@ -1,4 +1,8 @@
-//! An episode, simulated again and packed for the player in `pages/`.
+//! Episodes of an experiment, simulated again and packed for the player of the crate `web`.
+//!
+//! - [`Episode`] and [`Replay`]: an episode, and its packed form
+//! - [`WhatIf`]: changes of the experiment, and [`Interventions`] in the middle of its episode
+//! - [`Trials`]: the trials of an individual, one of which a replay shows
 //!
 //! Packed, an episode is gzip of: the length of the header (u32), the header (JSON, padded
 //! with spaces to a multiple of 8 bytes), and the columns that the header lists. A column is
@@ -6,8 +10,11 @@
 //! reading, or a light, or a measure.
 
 mod column;
+mod interventions;
 mod robots;
 mod scene;
+mod trials;
+mod what_if;
 
 use std::io::Write as _;
 
@@ -21,7 +28,11 @@ use self::{
     robots::{ROBOT_COLUMNS, RobotColumn},
     scene::Scene,
 };
-use crate::trials::Trials;
+pub use self::{
+    interventions::Interventions,
+    trials::{Judged, Trials},
+    what_if::{WhatIf, WhatIfError},
+};
 
 /// Values of all robots in all steps: some 1,000 steps of 1,000 robots, or 250 MB.
 const VALUES_MAX: usize = 64_000_000;

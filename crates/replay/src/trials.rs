@@ -2,7 +2,19 @@
 
 use serde::Serialize;
 use sim_core::{EvaluateError, Simulation, TrialSet};
-use swarm_proto::v1::JudgedFitness;
+
+/// The judgement of a champion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    /// The generation that it follows.
+    pub generation: u64,
+    /// Number of its trials.
+    pub trials: u32,
+    /// Mean fitness.
+    pub mean: f64,
+    /// Ends of the 95 % confidence interval of the mean.
+    pub interval: (f64, f64),
+}
 
 /// The trials that define the fitness of an individual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,14 +39,14 @@ impl Trials {
     pub fn of_judgement(
         simulation: &Simulation,
         genotype: &[f64],
-        judged: &JudgedFitness,
+        judged: Judged,
         keep_going: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, EvaluateError> {
-        let JudgedFitness { mean, low, high, trials, generation } = *judged;
+        let Judged { generation, trials, mean, interval } = judged;
         let set = TrialSet::Judgement(generation);
         let fitness = simulation.evaluate_while(genotype, set, 0..trials, keep_going)?;
         Ok(fitness.map(|fitness| {
-            let interval = Some((low, high));
+            let interval = Some(interval);
             Self { is_judgement: true, mean, interval, ..Self::of_generation(generation, fitness) }
         }))
     }
