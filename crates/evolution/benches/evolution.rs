@@ -1,9 +1,11 @@
 //! Measures the coordinator's work per generation, without fitness: ask and tell of 100 individuals
-//! with 445 genes, the size of experiment A; for repertoires of 1,000 individuals, with a full grid
-//! of 64 x 64 cells.
+//! with 445 genes, the size of experiment A; for repertoires and fronts of 1,000 individuals, with
+//! a full grid of 64 x 64 cells or one aim beside fitness.
+
+use std::cell::RefCell;
 
 use divan::{Bencher, counter::ItemsCount};
-use evolution::{Axis, Evolution, Generation, Params, Setup, Told};
+use evolution::{Axis, Direction, Evolution, Generation, Params, Setup, Told};
 
 const POPULATION_SIZE: u32 = 100;
 const N_GENES: usize = 445;
@@ -86,34 +88,67 @@ fn dns(bencher: Bencher, n_genes: usize) {
     repertoire(bencher, "DNS", n_genes);
 }
 
-/// As [`generation`], after enough generations to fill the grid.
+#[divan::bench(args = [12, 100, 455], sample_count = 20)]
+fn novelty(bencher: Bencher, n_genes: usize) {
+    repertoire(bencher, "novelty", n_genes);
+}
+
+#[divan::bench(args = [12, 100, 455], sample_count = 20)]
+fn sep_cma_mae(bencher: Bencher, n_genes: usize) {
+    repertoire(bencher, "sep-CMA-MAE", n_genes);
+}
+
+#[divan::bench(args = [12, 100], sample_count = 10)]
+fn cma_mae(bencher: Bencher, n_genes: usize) {
+    repertoire(bencher, "CMA-MAE", n_genes);
+}
+
+#[divan::bench(args = [12, 30, 100, 455], sample_count = 100)]
+fn nsga2(bencher: Bencher, n_genes: usize) {
+    let aims = vec![Direction::Minimise];
+    described_generation(bencher, Setup { aims, ..Setup::new("NSGA-II", n_genes) });
+}
+
+/// As [`generation`], generation after generation of a run that has filled the grid.
 fn repertoire(bencher: Bencher, algorithm: &str, n_genes: usize) {
-    const SIZE: u32 = 1000;
     let axes = vec![Axis { low: 0.0, high: 1.0, n_cells: 64 }; 2];
-    let setup = Setup { population_size: SIZE, seed: 1, axes, ..Setup::new(algorithm, n_genes) };
+    described_generation(bencher, Setup { axes, ..Setup::new(algorithm, n_genes) });
+}
+
+/// As [`generation`], with elites of many generations.
+fn described_generation(bencher: Bencher, setup: Setup) {
+    const SIZE: u32 = 1000;
+    let setup = Setup { population_size: SIZE, seed: 1, ..setup };
     let mut evolution = setup.start().expect("the parameters are right");
+    let n_descriptors = evolution.n_descriptors();
     for _ in 0..40 {
-        let told = described(&evolution, 1);
+        let told = described(&evolution.ask(), n_descriptors, 1);
         evolution.tell(evolution.ask(), &told).expect("all fitness is finite");
     }
+    let run = RefCell::new((Some(evolution.ask()), evolution));
     bencher
         .counter(ItemsCount::new(SIZE))
         .with_inputs(|| {
-            let generation = evolution.ask();
-            (evolution.clone(), generation, described(&evolution, N_TRIALS))
+            let run = run.borrow();
+            described(run.0.as_ref().expect("it was asked for"), n_descriptors, N_TRIALS)
         })
-        .bench_values(|(mut evolution, generation, told)| {
-            evolution.tell(generation, &told).expect("all fitness is finite");
-            (evolution.ask(), evolution)
+        .bench_local_values(|told| {
+            let (generation, evolution) = &mut *run.borrow_mut();
+            let asked = generation.take().expect("it was asked for");
+            evolution.tell(asked, &told).expect("all fitness is finite");
+            *generation = Some(evolution.ask());
+            told
         });
 }
 
-/// Behaviours all over the grid, which differ from generation to generation.
-fn described(evolution: &Evolution, n_trials: usize) -> Told {
-    let shift = evolution.n_generations() as f64 * 0.618;
+/// Descriptors all over the grid, or values of an aim, which differ from generation to generation.
+fn described(generation: &Generation, n_descriptors: usize, n_trials: usize) -> Told {
+    let shift = generation.index as f64 * 0.618;
     let row = |genes: &Vec<f64>| {
         let place = |gene: f64| (1000.0 * gene + shift).fract();
-        [genes[0], place(genes[1]), place(genes[2])].repeat(n_trials)
+        let values = [genes[0], place(genes[1]), place(genes[2])];
+        values[..=n_descriptors].repeat(n_trials)
     };
-    Told::from_values(&evolution.ask().genotypes.iter().map(row).collect::<Vec<_>>(), 2)
+    let values: Vec<Vec<f64>> = generation.genotypes.iter().map(row).collect();
+    Told::from_values(&values, n_descriptors)
 }

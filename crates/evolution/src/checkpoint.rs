@@ -19,7 +19,7 @@ use super::{
 pub(crate) const VERSION: u8 = 1;
 
 /// Target for the time to repeat the generations between two keyframes, ns.
-const REPLAY_NS: u64 = 600_000_000;
+const REPEAT_NS: u64 = 600_000_000;
 
 /// Most generations between two keyframes. Large keyframes are farther apart, so that they take at
 /// most [`ROOM_PER_GENERATION`].
@@ -87,7 +87,7 @@ impl Evolution {
                 .map(|population| number(population, self.population_size as u64));
             of_each.sum::<u64>().max(1)
         };
-        let for_time = (REPLAY_NS / sum(generation_ns)).clamp(1, GENERATIONS_MAX);
+        let for_time = (REPEAT_NS / sum(generation_ns)).clamp(1, GENERATIONS_MAX);
         let for_room = sum(state_len) / entry_len.max(ROOM_PER_GENERATION);
         for_time.max(for_room)
     }
@@ -102,7 +102,7 @@ impl Evolution {
         let evolution: Self = decode(VERSION, &checkpoint.keyframe)?;
         let mut evolution = evolution.after_flat(checkpoint.n_flat);
         for entry in &checkpoint.log {
-            evolution.replay(&Told::from_bytes(entry)?)?;
+            evolution.repeat(&Told::from_bytes(entry)?)?;
         }
         Ok(evolution)
     }
@@ -112,13 +112,18 @@ impl Evolution {
 fn generation_ns(algorithm: &Algorithm, population_size: u64) -> u64 {
     let d = algorithm.n_genes() as u64;
     let drawn = 20 * population_size * d;
+    // The time of decompositions and of products with matrices, which share the individuals.
+    let of_matrices = |n: u64| if n == 0 { 0 } else { d * d * (n * d + population_size) / 2 };
     match algorithm.keeps() {
         // Surviving takes about as long as drawing.
-        Keeps::Repertoire => 2 * drawn,
+        Keeps::Repertoire => 2 * drawn + of_matrices(n_matrices(algorithm)),
         Keeps::Vectors | Keeps::Population => drawn,
-        // The time of a decomposition and of products with the matrix.
-        Keeps::Matrix => drawn + d * d * (d + population_size) / 2,
+        Keeps::Matrix => drawn + of_matrices(1),
     }
+}
+
+fn n_matrices(algorithm: &Algorithm) -> u64 {
+    algorithm.behaviours().map_or(0, |behaviours| behaviours.n_matrices() as u64)
 }
 
 /// Estimated size of a state, bytes.
@@ -129,7 +134,8 @@ fn state_len(algorithm: &Algorithm, population_size: u64) -> u64 {
         Keeps::Matrix => d * d + algorithm.n_kept() as u64,
         Keeps::Population => population_size * d,
         Keeps::Repertoire => {
-            algorithm.repertoire().map_or(0, |repertoire| repertoire.n_kept() as u64 * d)
+            let n_kept = algorithm.behaviours().map_or(0, |behaviours| behaviours.n_kept() as u64);
+            n_kept * d + n_matrices(algorithm) * d * d / 2
         }
     };
     n_numbers * size_of::<f64>() as u64

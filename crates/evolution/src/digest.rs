@@ -16,16 +16,20 @@
 //! chain starts with 32 zero bytes. After each block of held-out trials, the next link is SHA-256
 //! of the previous link, the link of the latest generation, every gene of every candidate that met
 //! the block, and the fitness of each of these candidates in every trial. The judgement of the
-//! champion adds a link in the same way, and then that of the elites of a repertoire, with the fitness
-//! and the descriptors of every trial.
+//! champion adds a link in the same way, and then that of the elites of a repertoire, with the
+//! fitness and the descriptors of every trial.
 
-use std::{fmt, str::FromStr};
+use std::{
+    fmt,
+    str::FromStr,
+    sync::{Arc, OnceLock},
+};
 
 use experiment_file::ExperimentConfig;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::{Evaluations, Genotype};
+use super::{Evaluations, Genotype, Population};
 
 /// One link of the chain.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,19 +84,7 @@ impl Digest {
         genotypes: &[Genotype],
         told: impl Into<Evaluations<'a>>,
     ) -> Self {
-        let Evaluations { fitness, descriptors } = told.into();
-        let mut hash = Sha256::new();
-        hash.update(self.0);
-        hash.update(generation.to_le_bytes());
-        let mut bytes = Vec::new();
-        for values in genotypes.iter().chain(fitness).chain(descriptors) {
-            bytes.resize(size_of_val(&values[..]), 0);
-            for (bytes, value) in bytes.chunks_exact_mut(size_of::<f64>()).zip(values) {
-                bytes.copy_from_slice(&value.to_bits().to_le_bytes());
-            }
-            hash.update(&bytes);
-        }
-        Self(hash.finalize().into())
+        OpenLink::new(self, generation, genotypes).close(told.into())
     }
 
     /// The link after this one in the chain of re-evaluations; `generation`: the link of the
@@ -110,6 +102,83 @@ impl Digest {
             hash.update(value.to_bits().to_le_bytes());
         }
         Self(hash.finalize().into())
+    }
+}
+
+/// A link that lacks the evaluations, which come after the genes.
+#[derive(Debug, Clone)]
+struct OpenLink(Sha256);
+
+impl OpenLink {
+    fn new(previous: Digest, generation: u64, genotypes: &[Genotype]) -> Self {
+        let mut hash = Sha256::new();
+        hash.update(previous.0);
+        hash.update(generation.to_le_bytes());
+        let mut link = Self(hash);
+        link.extend(genotypes);
+        link
+    }
+
+    fn close(mut self, Evaluations { fitness, descriptors }: Evaluations<'_>) -> Digest {
+        self.extend(fitness);
+        self.extend(descriptors);
+        Digest(self.0.finalize().into())
+    }
+
+    fn extend(&mut self, rows: &[Vec<f64>]) {
+        let mut bytes = Vec::new();
+        for values in rows {
+            bytes.resize(size_of_val(&values[..]), 0);
+            for (bytes, value) in bytes.chunks_exact_mut(size_of::<f64>()).zip(values) {
+                bytes.copy_from_slice(&value.to_bits().to_le_bytes());
+            }
+            self.0.update(&bytes);
+        }
+    }
+}
+
+/// The link of a generation whose evaluations are not known yet. Hashing the genes takes a third of
+/// the time of [`Evolution::tell`](super::Evolution::tell), which finds this done if somebody has
+/// called [`hash_genes`](Self::hash_genes) while the generation was evaluated.
+#[derive(Debug)]
+pub struct NextLink {
+    previous: Digest,
+    generation: u64,
+    genotypes: Population,
+    open: OnceLock<OpenLink>,
+}
+
+/// Equal if the links will be equal for equal evaluations.
+impl PartialEq for NextLink {
+    fn eq(&self, other: &Self) -> bool {
+        (self.previous, self.generation, &self.genotypes)
+            == (other.previous, other.generation, &other.genotypes)
+    }
+}
+
+impl NextLink {
+    pub(crate) fn new(previous: Digest, generation: u64, genotypes: &Population) -> Self {
+        let genotypes = Arc::clone(genotypes);
+        Self { previous, generation, genotypes, open: OnceLock::new() }
+    }
+
+    /// Hashes the genes, unless that is done.
+    pub fn hash_genes(&self) {
+        self.open();
+    }
+
+    /// The link after `previous`, with the evaluations. A generation may also be told to an
+    /// evolution that has not drawn it, whose chain is another one.
+    pub(crate) fn close(&self, previous: Digest, evaluations: Evaluations<'_>) -> Digest {
+        if previous == self.previous {
+            return self.open().clone().close(evaluations);
+        }
+        previous.next(self.generation, &self.genotypes, evaluations)
+    }
+
+    fn open(&self) -> &OpenLink {
+        let Self { previous, generation, genotypes, open } = self;
+        open.get_or_init(|| OpenLink::new(*previous, *generation, genotypes))
     }
 }
 

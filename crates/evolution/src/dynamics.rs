@@ -29,7 +29,7 @@ impl Evolution {
     /// If `told` does not fit this state, or has no finite fitness.
     pub fn dynamics(&mut self, told: &Told) -> Result<Dynamics, CheckpointError> {
         let before = self.mean();
-        let digest = self.replay(told)?.summary.digest;
+        let digest = self.repeat(told)?.summary.digest;
         let mean_step = before.zip(self.mean()).map(|(before, after)| {
             let squares = before.iter().zip(&after).map(|(a, b)| (a - b) * (a - b));
             squares.sum::<f64>().sqrt()
@@ -136,7 +136,7 @@ mod tests {
                 );
                 let before = evolution.mean();
                 let found = evolution.dynamics(&told).unwrap();
-                same.replay(&told).unwrap();
+                same.repeat(&told).unwrap();
                 assert_eq!((&same, found.digest), (&evolution, evolution.digest()));
                 let moved = before.zip(evolution.mean());
                 assert_eq!(found.mean_step.is_some(), moved.is_some(), "{}", algorithm.name);

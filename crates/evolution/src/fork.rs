@@ -73,9 +73,13 @@ impl Evolution {
                 child.generations, self.n_generations
             ));
         }
-        if parent.descriptors != child.descriptors {
+        let are_changed = [
+            ("descriptors", parent.descriptors != child.descriptors),
+            ("aims", parent.aims != child.aims),
+        ];
+        for (key, _) in are_changed.into_iter().filter(|(_, is_changed)| *is_changed) {
             problems.push(format!(
-                "algorithm.descriptors: are part of the state of {}, and cannot change in a fork",
+                "algorithm.{key}: are part of the state of {}, and cannot change in a fork",
                 parent.name
             ));
         }

@@ -1,5 +1,5 @@
-//! The judgement of a champion, and of every elite of a repertoire: their honest fitness, on trials
-//! that selected nothing.
+//! The judgement of a champion, and of every elite of a repertoire or of a front: their honest
+//! fitness, on trials that selected nothing.
 
 use determinism::random::TrialSet;
 
@@ -7,12 +7,12 @@ use super::{
     Champion, Digest, End, Genotype, Population, champion::Judged, finite_mean, interval::interval,
 };
 
-/// A champion to judge, and the elites of its repertoire.
+/// A champion to judge, and the elites of its repertoire or front.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
     generation: u64,
     champion: Champion,
-    /// Empty without a repertoire.
+    /// Empty without a repertoire or a front.
     elites: Vec<Genotype>,
     /// Numbers of a trial: its fitness, and its descriptors.
     values_per_trial: usize,
@@ -51,7 +51,7 @@ impl Judgement {
         [&self.champion.genotype].into_iter().chain(&self.elites).cloned().collect()
     }
 
-    /// Numbers of a trial: its fitness, and its descriptors in repertoires.
+    /// Numbers of a trial: its fitness, and its descriptors in repertoires and fronts.
     pub fn values_per_trial(&self) -> usize {
         self.values_per_trial
     }

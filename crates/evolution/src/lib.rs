@@ -50,8 +50,11 @@ mod champion;
 mod checkpoint;
 mod digest;
 mod distribution;
+mod dominance;
 mod dynamics;
 mod fork;
+mod front;
+mod hypervolume;
 pub mod interval;
 mod judgement;
 mod lineage;
@@ -59,7 +62,7 @@ mod ranking;
 mod real;
 mod reevaluation;
 mod repertoire;
-mod replay;
+mod repetition;
 mod setup;
 mod stall;
 mod statistics;
@@ -74,11 +77,12 @@ use serde::{Deserialize, Serialize};
 pub use algorithms::{ALGORITHMS, Axis};
 pub use champion::{Champion, ChampionSource, HeldOut, Judged};
 pub use checkpoint::{Checkpoint, CheckpointError};
-pub use digest::Digest;
+pub use digest::{Digest, NextLink};
 pub use distribution::Distribution;
 pub use dynamics::Dynamics;
-pub use experiment_file::Params;
+pub use experiment_file::{Direction, Params};
 pub use fork::{Fork, ForkError};
+pub use front::{Front, FrontFigures};
 pub use judgement::Judgement;
 pub use lineage::{
     Ancestor, Birth, BirthOf, Families, GeneSource, Operator, Parent, Parents, Pedigree,
@@ -86,13 +90,13 @@ pub use lineage::{
 pub use real::{NotANumber, Real};
 pub use reevaluation::Reevaluation;
 pub use repertoire::{Corrected, EliteReport, JudgedElite, Repertoire};
-pub use replay::{Outcome, Replay, Round};
+pub use repetition::{Evaluated, Outcome, Repeated};
 pub use setup::{Setup, SetupError};
 pub use stall::{Drifted, FLAT_COUNTED_MAX, Learnt};
 pub use statistics::{Statistics, between, deviation, finite_mean};
 pub use told::{End, Evaluations, Told};
 
-use algorithms::{Algorithm, Lesson, Sample};
+use algorithms::{Algorithm, BesideFitness, Lesson, Sample};
 use distribution::stream_of;
 use stall::FlatGenerations;
 
@@ -134,6 +138,15 @@ pub struct Generation {
     pub genotypes: Population,
     /// The draws of each population's algorithm, in the order of the segments.
     samples: Vec<Sample>,
+    link: Arc<NextLink>,
+}
+
+impl Generation {
+    /// The generation's link of the digest chain, for a thread that hashes the genes while the
+    /// generation is evaluated.
+    pub fn link(&self) -> Arc<NextLink> {
+        Arc::clone(&self.link)
+    }
 }
 
 /// A summary of the fitness of a generation.
@@ -184,11 +197,14 @@ impl Evolution {
     /// of experiment files refuses such a file.
     pub fn new(config: &ExperimentConfig, segments: &[Range<usize>], simulation: &str) -> Self {
         let algorithm = &config.algorithm;
-        let axes: Vec<Axis> = algorithm.descriptors.iter().map(Axis::from).collect();
+        let beside = BesideFitness {
+            axes: algorithm.descriptors.iter().map(Axis::from).collect(),
+            aims: algorithm.aims.iter().map(|aim| aim.direction).collect(),
+        };
         let populations = algorithm.populations.values().zip(segments);
         let populations = populations
             .map(|(population, segment)| {
-                Algorithm::new(&algorithm.name, &population.params, segment.len(), &axes)
+                Algorithm::new(&algorithm.name, &population.params, segment.len(), &beside)
                     .expect("the reader knows the algorithm")
             })
             .collect();
@@ -274,12 +290,19 @@ impl Evolution {
             [only] => Arc::clone(&only.genotypes),
             _ => (0..self.population_size).map(whole).collect(),
         };
-        Generation { index: self.n_generations, genotypes, samples }
+        self.generation(genotypes, samples)
+    }
+
+    /// The next generation, with these genotypes.
+    fn generation(&self, genotypes: Population, samples: Vec<Sample>) -> Generation {
+        let index = self.n_generations;
+        let link = Arc::new(NextLink::new(self.digest, index, &genotypes));
+        Generation { index, genotypes, samples, link }
     }
 
     /// Learns from a generation that [`ask`](Self::ask) drew. `fitness[i][t]` of the evaluations:
     /// fitness of individual i in trial t; its mean over t is the individual's fitness, and larger
-    /// is better. A repertoire also learns from the descriptors.
+    /// is better. A repertoire also learns from descriptors, and a front from the values of aims.
     ///
     /// # Errors
     ///
@@ -294,7 +317,7 @@ impl Evolution {
         generation: Generation,
         evaluations: impl Into<Evaluations<'a>>,
     ) -> Result<GenerationSummary, EvolutionError> {
-        let Generation { index, genotypes, samples } = generation;
+        let Generation { index, genotypes, samples, link } = generation;
         let told = evaluations.into();
         let Evaluations { fitness: trial_fitness, descriptors } = told;
         assert_eq!(index, self.n_generations, "generations are told in order");
@@ -303,7 +326,7 @@ impl Evolution {
         assert_eq!(
             n_described,
             descriptors.len(),
-            "descriptors for repertoires, and only for them"
+            "descriptors for repertoires and fronts, and only for them"
         );
         let fitness = means(trial_fitness);
         let ranking = ranking::ranking(&fitness);
@@ -330,7 +353,7 @@ impl Evolution {
                 self.champion.clone_from(&self.challenger);
             }
         }
-        self.digest = self.digest.next(index, &genotypes, told);
+        self.digest = link.close(self.digest, told);
         self.n_generations += 1;
         let statistics = Statistics::from_fitness(&fitness);
         let n_non_finite = fitness.iter().filter(|value| !value.is_finite()).count();
@@ -372,8 +395,8 @@ impl Evolution {
         self.champion_digest = digest;
     }
 
-    /// The present champion and the elites of a repertoire, to judge on trials that select nothing;
-    /// `None` before the first generation. The judgement does not change evolution.
+    /// The present champion and the elites of a repertoire or of a front, to judge on trials that
+    /// select nothing; `None` before the first generation. The judgement does not change evolution.
     pub fn judgement(&self) -> Option<Judgement> {
         let generation = self.n_generations.checked_sub(1)?;
         let champion = self.champion.clone()?;
@@ -394,8 +417,9 @@ pub fn has_finite_fitness(trial_fitness: &[Vec<f64>]) -> bool {
     trial_fitness.iter().any(|trials| mean(trials).is_finite())
 }
 
-/// The plain mean, summed in order.
-fn mean(values: &[f64]) -> f64 {
+/// The plain mean, summed in order: the fitness of an individual with these fitnesses in its
+/// trials.
+pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 

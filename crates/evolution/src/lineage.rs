@@ -1,5 +1,5 @@
-//! Lineages: the ancestors of an individual of a genetic algorithm or of a repertoire, and the
-//! survival of their genes.
+//! Lineages: the ancestors of an individual of a genetic algorithm, a repertoire or a front, and
+//! the survival of their genes.
 //!
 //! Lineages are not stored: redrawing a generation from the state before it gives the parents of
 //! each child, and the genes that the child has from each.
@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use super::{Evolution, Genotype, Told, distribution::stream_of, mean, ranking::ranking};
 
-/// The parents of an individual: in genetic algorithms by rank in the previous generation, 0 for the
-/// best; in repertoires by generation and index of their own birth.
+/// The parents of an individual: in genetic algorithms by rank in the previous generation, 0 for
+/// the best; in repertoires and fronts by generation and index of their own birth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parents {
     /// No parents, in the first generation.
@@ -24,6 +24,10 @@ pub enum Parents {
     Again((u64, u32)),
     /// A point near the line through two elites, closest to the first.
     Line((u64, u32), (u64, u32)),
+    /// This individual of a front, mutated.
+    Mutated((u64, u32)),
+    /// Two crossed individuals of a front, mutated.
+    Crossed((u64, u32), (u64, u32)),
 }
 
 /// The origin of a gene.
@@ -91,7 +95,7 @@ pub struct BirthOf {
 /// A parent, and what a child has from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Parent {
-    /// Its generation: the previous one, or that of its birth in a repertoire.
+    /// Its generation: the previous one, or that of its birth in a repertoire or a front.
     pub generation: u64,
     /// Its index in that generation.
     pub individual: u32,
@@ -239,10 +243,10 @@ fn parents_of(birth: &Birth, latest: u64, individual_of: &[u32]) -> Vec<Parent> 
         Parents::None => Vec::new(),
         Parents::Elite(rank) | Parents::One(rank) => ranks(&[rank]),
         Parents::Two(a, b) => ranks(&[a, b]),
-        Parents::Again(elite) => vec![elite],
-        // An elite may be drawn twice.
-        Parents::Line(a, b) if a == b => vec![a],
-        Parents::Line(a, b) => vec![a, b],
+        Parents::Again(one) | Parents::Mutated(one) => vec![one],
+        // An individual may be drawn twice.
+        Parents::Line(a, b) | Parents::Crossed(a, b) if a == b => vec![a],
+        Parents::Line(a, b) | Parents::Crossed(a, b) => vec![a, b],
     };
     let parent = |((generation, individual), source)| Parent {
         generation,
@@ -256,8 +260,8 @@ fn birth_of(birth: &Birth, parents: Vec<Parent>) -> BirthOf {
     let operator = match birth.parents {
         Parents::None => Operator::First,
         Parents::Elite(_) | Parents::Again(_) => Operator::Elite,
-        Parents::One(_) => Operator::Copy,
-        Parents::Two(..) => Operator::Crossover,
+        Parents::One(_) | Parents::Mutated(_) => Operator::Copy,
+        Parents::Two(..) | Parents::Crossed(..) => Operator::Crossover,
         Parents::Line(..) => Operator::Line,
     };
     let n_new = birth.sources.iter().filter(|&&source| source == GeneSource::New).count();

@@ -2,8 +2,8 @@
 //!
 //! The fitness by which an elite got its place is optimistic, because luck took part in the choice,
 //! and luck may have shown a behaviour that is not its own. The judgement at the end of a run
-//! evaluates every elite on trials that selected nothing. The corrected repertoire has each elite in
-//! the cell of its judged behaviour. If several are in a cell, the evidence of the run decides
+//! evaluates every elite on trials that selected nothing. The corrected repertoire has each elite
+//! in the cell of its judged behaviour. If several are in a cell, the evidence of the run decides
 //! between them, so that the judgement still selects nothing.
 
 use std::collections::BTreeMap;
@@ -63,31 +63,39 @@ pub struct Corrected {
 }
 
 impl Evolution {
-    /// The repertoire, if the algorithm has one.
+    /// The repertoire or the front, if the algorithm has one.
     pub(crate) fn behaviours(&self) -> Option<&dyn Behaviours> {
         let [only] = &self.populations[..] else { return None };
-        only.repertoire()
+        only.behaviours()
     }
 
-    /// Number of descriptors that [`tell`](Self::tell) expects per trial.
+    /// Number of descriptors that [`tell`](Self::tell) expects per trial: the values of descriptors
+    /// or of aims.
     pub fn n_descriptors(&self) -> usize {
-        self.behaviours().map_or(0, |repertoire| repertoire.axes().len())
+        self.behaviours().map_or(0, Behaviours::n_descriptors)
     }
 
     /// The elites of the present repertoire; `None` without one. `end`: the judgement after this
     /// generation, if it is the last of a run.
     pub fn elites(&self, end: &End) -> Option<Repertoire<'_>> {
-        let repertoire = self.behaviours()?;
-        let axes = repertoire.axes();
+        let axes = self.behaviours()?.axes();
+        (!axes.is_empty()).then(|| Repertoire { axes: axes.to_vec(), elites: self.reports(end) })
+    }
+
+    /// The elites of a repertoire or of a front, in the order in which they came.
+    pub(crate) fn reports(&self, end: &End) -> Vec<EliteReport<'_>> {
+        let Some(behaviours) = self.behaviours() else { return Vec::new() };
+        let axes = behaviours.axes();
         let cell = |descriptors: &[f64]| -> Vec<u32> {
             axes.iter().zip(descriptors).map(|(axis, &value)| axis.cell(value)).collect()
         };
-        let elites = repertoire.elites();
+        let n_values = 1 + behaviours.n_descriptors();
+        let elites = behaviours.elites();
         let judged = |nth: usize| {
             let values = end.elites.get(nth).filter(|_| end.elites.len() == elites.len())?;
-            let trials = values.chunks_exact(1 + axes.len());
+            let trials = values.chunks_exact(n_values);
             let n_trials = trials.len() as f64;
-            let mut sums = vec![0.0; 1 + axes.len()];
+            let mut sums = vec![0.0; n_values];
             for trial in trials {
                 sums.iter_mut().zip(trial).for_each(|(sum, value)| *sum += value);
             }
@@ -100,7 +108,7 @@ impl Evolution {
                 descriptors,
             })
         };
-        let elites = elites.iter().enumerate().map(|(nth, elite)| EliteReport {
+        let reports = elites.iter().enumerate().map(|(nth, elite)| EliteReport {
             genotype: &elite.genotype,
             generation: elite.generation,
             individual: elite.individual,
@@ -110,7 +118,7 @@ impl Evolution {
             n_trials: elite.n_trials,
             judged: judged(nth),
         });
-        Some(Repertoire { axes: axes.to_vec(), elites: elites.collect() })
+        reports.collect()
     }
 }
 

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use experiment_file::{AlgorithmDescription, LearnsFrom, Params};
+use experiment_file::{AlgorithmDescription, Direction, LearnsFrom, Params, limits};
 
-use super::{ALGORITHMS, Algorithm, Axis, Digest, Evolution};
+use super::{ALGORITHMS, Algorithm, Axis, BesideFitness, Digest, Evolution};
 
 /// The algorithm and the shape of an evolution.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +21,8 @@ pub struct Setup {
     pub seed: u64,
     /// The grid of descriptors, for algorithms that evolve a repertoire.
     pub axes: Vec<Axis>,
+    /// The aims beside fitness, for algorithms that evolve a front.
+    pub aims: Vec<Direction>,
 }
 
 /// All mistakes of a [`Setup`], one sentence each; never empty. The caller has to change the
@@ -42,6 +44,7 @@ impl Setup {
             population_size: 20,
             seed: 0,
             axes: Vec::new(),
+            aims: Vec::new(),
         }
     }
 
@@ -62,7 +65,8 @@ impl Setup {
     /// As [`check`](Self::check).
     pub fn start(&self) -> Result<Evolution, SetupError> {
         self.check()?;
-        let algorithm = Algorithm::new(&self.algorithm, &self.params, self.n_genes, &self.axes);
+        let beside = BesideFitness { axes: self.axes.clone(), aims: self.aims.clone() };
+        let algorithm = Algorithm::new(&self.algorithm, &self.params, self.n_genes, &beside);
         let population = algorithm.expect("the algorithm is known");
         let size = self.population_size as usize;
         Ok(Evolution::from_parts(self.seed, size, vec![population], Digest::of_text(&self.text())))
@@ -96,6 +100,7 @@ impl Setup {
                 false => format!("{name} knows no descriptors"),
             });
         }
+        problems.extend(self.problems_of_aims(algorithm));
         for parameter in algorithm.parameters {
             let value = self.params.get(parameter);
             if let Some(value) = value.filter(|value| !parameter.domain.contains(value, size)) {
@@ -109,15 +114,42 @@ impl Setup {
         problems
     }
 
+    /// The mistakes of the aims, and of the size of a front.
+    fn problems_of_aims(&self, algorithm: &AlgorithmDescription) -> Vec<String> {
+        let (name, n_aims, size) = (algorithm.name, self.aims.len(), self.population_size);
+        let mut problems = Vec::new();
+        if algorithm.learns_from != LearnsFrom::Aims {
+            if n_aims > 0 {
+                problems.push(format!("{name} knows no aims beside fitness"));
+            }
+            return problems;
+        }
+        if !(1..=limits::AIMS).contains(&n_aims) {
+            let max = limits::AIMS;
+            problems.push(format!("{name} needs 1 to {max} aims beside fitness, not {n_aims}"));
+        }
+        if size > limits::ELITES {
+            let max = limits::ELITES;
+            problems.push(format!("{name} takes at most {max} individuals, not {size}"));
+        }
+        problems
+    }
+
     /// The whole setup as text, for the digest.
     fn text(&self) -> String {
-        let Self { algorithm, params, n_genes, population_size, seed, axes } = self;
+        let Self { algorithm, params, n_genes, population_size, seed, axes, aims } = self;
         let mut text = format!("{algorithm}\n{n_genes}\n{population_size}\n{seed}\n");
         for (key, value) in params.iter() {
             text += &format!("{key} {value}\n");
         }
         for Axis { low, high, n_cells } in axes {
             text += &format!("axis {low} {high} {n_cells}\n");
+        }
+        for aim in aims {
+            text += match aim {
+                Direction::Maximise => "maximise\n",
+                Direction::Minimise => "minimise\n",
+            };
         }
         text
     }
@@ -161,6 +193,22 @@ mod tests {
         assert_eq!(problems(&Setup::new("SNES", 0)), ["a genotype needs at least 1 gene"]);
         let expected = "no algorithm is named `PSO`; known: GA, SNES, ";
         assert!(problems(&Setup::new("PSO", 1))[0].starts_with(expected));
+    }
+
+    #[test]
+    fn aims_belong_to_fronts_and_are_part_of_the_digest() {
+        let aims = |aims: &[Direction], name| Setup { aims: aims.to_vec(), ..Setup::new(name, 2) };
+        let [most, least] = [Direction::Maximise, Direction::Minimise];
+        assert_eq!(problems(&aims(&[most], "GA")), ["GA knows no aims beside fitness"]);
+        let large = Setup { population_size: 16_385, ..aims(&[], "NSGA-II") };
+        let expected = [
+            "NSGA-II needs 1 to 2 aims beside fitness, not 0",
+            "NSGA-II takes at most 16384 individuals, not 16385",
+        ];
+        assert_eq!(problems(&large), expected);
+        assert_eq!(problems(&aims(&[most; 3], "NSGA-II")).len(), 1);
+        let digest = |aim| aims(&[aim], "NSGA-II").start().unwrap().digest();
+        assert_ne!(digest(most), digest(least));
     }
 
     #[test]

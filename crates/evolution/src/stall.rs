@@ -149,7 +149,7 @@ impl Evolution {
         let mut remarks = Vec::new();
         let n_flat = summary.n_flat;
         let is_due = n_flat >= FLAT_MIN && n_flat.to_string().trim_end_matches('0') == "1";
-        // A repertoire also learns from behaviours.
+        // A repertoire also learns from behaviours, and a front from other aims.
         let needs_fitness = self.behaviours().is_none();
         if needs_fitness && (is_due || (is_last && n_flat > 1)) {
             remarks.push(self.flat(summary));

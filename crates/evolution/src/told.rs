@@ -2,7 +2,7 @@
 //!
 //! [`ask`](super::Evolution::ask) and [`tell`](super::Evolution::tell) are pure functions, so the
 //! log and one state of evolution determine every later state, and every genotype:
-//! [`replay`](super::Evolution::replay) repeats them.
+//! [`repeat`](super::Evolution::repeat) repeats them.
 //!
 //! An entry begins with a byte for the version of its format; the rest is in the format of
 //! postcard, as in checkpoints. Entries with descriptors have a version of their own.
@@ -29,7 +29,7 @@ pub struct Told {
     /// Fitness of every individual in every trial; shape `[individual][trial]`.
     pub trial_fitness: Vec<Vec<f64>>,
     /// The descriptors of every individual, for each trial all of them; empty if the experiment has
-    /// no descriptors.
+    /// neither descriptors nor aims. The values of aims are descriptors, too.
     pub descriptors: Vec<Vec<f64>>,
     /// Fitness in the re-evaluation after the generation; shape `[block][candidate][trial]`. Empty
     /// without a re-evaluation, or if the re-evaluation is in [`end`](Self::end).
@@ -45,8 +45,8 @@ pub struct End {
     pub blocks: Vec<Vec<Vec<f64>>>,
     /// The champion's fitness in every trial of its judgement; empty without a judgement.
     pub judgement: Vec<f64>,
-    /// The judgement of every elite of a repertoire: for each trial its fitness and then its
-    /// descriptors.
+    /// The judgement of every elite of a repertoire or of a front: for each trial its fitness and
+    /// then its descriptors.
     pub elites: Vec<Vec<f64>>,
 }
 

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Described, Sample, Strategy,
+    Described, Draws, Sample, Strategy,
     cumulation::{Cumulation, Rates, VARIANCE_MAX, damping},
     draw_normals,
     linalg::{Eigen, Symmetric},
@@ -60,6 +60,19 @@ impl CmaEs {
         Self { mean, covariance: Symmetric::identity(d), cumulation: Cumulation::new(sigma, d) }
     }
 
+    /// x_i = m + sigma * y_i, y_i = C^(1/2) z_i, z_i ~ N(0, I). With the symmetric
+    /// root, z_i is also C^(-1/2) y_i, so learning needs no root.
+    pub fn draw(&self, n: usize, rng: &mut Stream) -> Draws {
+        let normals = draw_normals(n, self.mean.len(), rng);
+        let steps = self.steps(&normals);
+        let sigma = self.cumulation.sigma;
+        let genotypes = steps
+            .iter()
+            .map(|y| self.mean.iter().zip(y).map(|(mean, y)| mirror(mean + sigma * y)).collect())
+            .collect();
+        Draws { genotypes, normals, steps }
+    }
+
     /// The decomposition of C.
     pub fn eigen(&self) -> Eigen {
         Eigen::new(&self.covariance.to_dense())
@@ -104,17 +117,8 @@ impl Strategy for CmaEs {
         Some(&self.mean)
     }
 
-    /// x_i = m + sigma * y_i, y_i = C^(1/2) z_i, z_i ~ N(0, I). With the symmetric
-    /// root, z_i is also C^(-1/2) y_i, so learning needs no root.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let normals = draw_normals(population_size, self.mean.len(), rng);
-        let steps = self.steps(&normals);
-        let sigma = self.cumulation.sigma;
-        let genotypes = steps
-            .iter()
-            .map(|y| self.mean.iter().zip(y).map(|(mean, y)| mirror(mean + sigma * y)).collect())
-            .collect();
-        Sample { steps, ..Sample::new(genotypes, normals) }
+        self.draw(population_size, rng).into()
     }
 
     /// Eq. 41 to 47.

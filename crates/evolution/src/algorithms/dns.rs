@@ -7,7 +7,9 @@
 use experiment_file::{AlgorithmDescription, ELITES, Keeps, LearnsFrom, Parameter, Params};
 use serde::{Deserialize, Serialize};
 
-use super::repertoire::{Evidence, ISO_SIGMA, LINE_SIGMA, REEVALUATED, Rule};
+use super::repertoire::{
+    Evidence, ISO_SIGMA, LINE_SIGMA, Nearest, Neighbours, REEVALUATED, Rule, square,
+};
 
 /// Those far from all that are fitter survive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,9 +45,24 @@ impl Rule for Dns {
         }
     }
 
-    fn survivors(&self, pool: &[Evidence]) -> Vec<usize> {
-        let distances = pool.iter().map(|own| self.distance(own, pool));
-        let mut order: Vec<(f64, usize)> = distances.zip(0..).collect();
+    fn survivors(&self, pool: &[Evidence], _: usize) -> Vec<usize> {
+        let neighbours = Neighbours::new(pool);
+        let mut by_fitness: Vec<usize> = (0..pool.len()).collect();
+        by_fitness.sort_by(|&a, &b| pool[b].fitness.total_cmp(&pool[a].fitness));
+        let distance = |place: usize| {
+            let own = &pool[place];
+            let is_fitter = |other: usize| pool[other].fitness > own.fitness;
+            let n_fitter = by_fitness.partition_point(|&other| is_fitter(other));
+            if n_fitter > FEW {
+                return neighbours.distance(place, self.n_nearest, is_fitter);
+            }
+            let mut nearest = Nearest::new(self.n_nearest);
+            for &fitter in &by_fitness[..n_fitter] {
+                nearest.add(square(&own.point, &pool[fitter].point));
+            }
+            nearest.mean()
+        };
+        let mut order: Vec<(f64, usize)> = (0..pool.len()).map(distance).zip(0..).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut survivors: Vec<usize> =
             order.into_iter().take(self.n_elites).map(|(_, i)| i).collect();
@@ -54,24 +71,5 @@ impl Rule for Dns {
     }
 }
 
-impl Dns {
-    /// Mean distance to the nearest fitter individuals; infinite if none is fitter.
-    fn distance(&self, own: &Evidence, pool: &[Evidence]) -> f64 {
-        let fitter = pool.iter().filter(|other| other.fitness > own.fitness);
-        let mut squares: Vec<f64> = fitter.map(|other| square(&own.point, &other.point)).collect();
-        if squares.is_empty() {
-            return f64::INFINITY;
-        }
-        let k = self.n_nearest.min(squares.len());
-        squares.select_nth_unstable_by(k - 1, f64::total_cmp);
-        squares.truncate(k);
-        // Summed in an order that no selection algorithm decides.
-        squares.sort_by(f64::total_cmp);
-        squares.iter().map(|square| square.sqrt()).sum::<f64>() / k as f64
-    }
-}
-
-/// Squared Euclidean distance.
-fn square(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
-}
+/// Number of fitter individuals up to which a search among all takes longer.
+const FEW: usize = 128;

@@ -37,7 +37,7 @@ impl Rule for MapElites {
         Self { depth: depth.min(limits::ELITES as usize / n_cells).max(1) }
     }
 
-    fn survivors(&self, pool: &[Evidence]) -> Vec<usize> {
+    fn survivors(&self, pool: &[Evidence], _: usize) -> Vec<usize> {
         best_of_cells(pool, self.depth)
     }
 
@@ -48,14 +48,33 @@ impl Rule for MapElites {
 
 /// The `n` fittest of every cell, the first of equals, in ascending order of their places.
 fn best_of_cells(pool: &[Evidence], n: usize) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..pool.len()).collect();
-    order.sort_by(|&a, &b| {
-        let (a, b) = (&pool[a], &pool[b]);
-        let by_fitness = b.fitness.partial_cmp(&a.fitness).unwrap_or(Ordering::Equal);
-        a.cell.cmp(&b.cell).then(by_fitness)
+    let n_cells = pool.iter().map(|individual| individual.cell + 1).max().unwrap_or(0);
+    // The places of a cell follow each other in `order`, up to its end.
+    let mut ends = vec![0; n_cells];
+    pool.iter().for_each(|individual| ends[individual.cell] += 1);
+    let mut sum = 0;
+    ends.iter_mut().for_each(|end| {
+        sum += *end;
+        *end = sum - *end;
     });
-    let cells = order.chunk_by(|&a, &b| pool[a].cell == pool[b].cell);
-    let mut best: Vec<usize> = cells.flat_map(|cell| cell.iter().copied().take(n)).collect();
-    best.sort_unstable();
-    best
+    let mut order = vec![0; pool.len()];
+    for (place, individual) in pool.iter().enumerate() {
+        let end = &mut ends[individual.cell];
+        order[*end] = place;
+        *end += 1;
+    }
+    let mut stays = vec![true; pool.len()];
+    let mut start = 0;
+    for end in ends {
+        let cell = &mut order[start..end];
+        start = end;
+        if cell.len() > n {
+            // The sort is stable, so equal fitness keeps the order of the places.
+            cell.sort_by(|&a, &b| {
+                pool[b].fitness.partial_cmp(&pool[a].fitness).unwrap_or(Ordering::Equal)
+            });
+            cell[n..].iter().for_each(|&place| stays[place] = false);
+        }
+    }
+    stays.iter().enumerate().filter(|(_, stays)| **stays).map(|(place, _)| place).collect()
 }

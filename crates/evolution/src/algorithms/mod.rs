@@ -2,16 +2,21 @@
 //!
 //! An algorithm is one file and one row of the registry below. The file of an algorithm that learns
 //! from fitness implements [`Strategy`] and [`Described`]. The file of an algorithm that evolves a
-//! repertoire of different behaviours implements [`Rule`]. Its names, parameters and limits in
-//! experiment files, in their JSON Schema, in `docs/keys.md` and in `docs/algorithms.md` follow from
-//! its description.
+//! repertoire of different behaviours implements [`Rule`](repertoire::Rule), or [`Behaviours`] if
+//! it varies them in its own way; that of one that evolves a front implements [`Behaviours`]. Its
+//! names, parameters and limits in experiment files, in their JSON Schema, in `docs/keys.md` and in
+//! `docs/algorithms.md` follow from its description.
 
+mod bounded;
 mod cma_es;
+mod cma_mae;
 mod cumulation;
 mod dns;
 mod ga;
 mod linalg;
 mod map_elites;
+mod novelty;
+mod nsga2;
 mod openai_es;
 mod pairs;
 mod parameters;
@@ -26,25 +31,36 @@ mod xnes;
 use std::iter;
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmDescription, Keeps, Params};
+use experiment_file::{AlgorithmDescription, Direction, Keeps, Params};
 use serde::{Deserialize, Serialize};
 
 use super::{Birth, Evaluations, Genotype, Population};
+use cma_mae::Annealing;
+#[cfg(test)]
+pub use repertoire::Elite;
+use repertoire::Repertoire;
 pub use repertoire::{Axis, Behaviours};
-use repertoire::{Repertoire, Rule};
 
-/// What depends on the kind of an algorithm: a strategy, or a rule of a repertoire.
+/// What depends on the kind of an algorithm: a strategy, a front, or a repertoire of some part of
+/// its own.
 macro_rules! kind {
     (state: $state:ty) => { $state };
-    (state: $rule:ty, $repertoire:ident) => { $repertoire<$rule> };
+    (state: $state:ty, Front) => { $state };
+    (state: $part:ty, $repertoire:ident) => { $repertoire<$part> };
     (description: $state:ty) => { <$state as Described>::DESCRIPTION };
-    (description: $rule:ty, $repertoire:ident) => { <$rule as Rule>::DESCRIPTION };
-    (start: $params:ident, $d:ident, $axes:ident) => { Described::start($params, $d) };
-    (start: $params:ident, $d:ident, $axes:ident, $repertoire:ident) => {
-        $repertoire::start($params, $d, $axes)
+    (description: $state:ty, Front) => { <$state>::DESCRIPTION };
+    (description: $part:ty, $repertoire:ident) => { $repertoire::<$part>::DESCRIPTION };
+    (start: $state:ty, $params:ident, $d:ident, $beside:ident) => {
+        Described::start($params, $d)
+    };
+    (start: $state:ty, $params:ident, $d:ident, $beside:ident, Front) => {
+        <$state>::start($params, $d, &$beside.aims)
+    };
+    (start: $part:ty, $params:ident, $d:ident, $beside:ident, $repertoire:ident) => {
+        $repertoire::start($params, $d, &$beside.axes)
     };
     (name: $state:ident) => { Kind::Strategy($state) };
-    (name: $state:ident, $repertoire:ident) => { Kind::$repertoire($state) };
+    (name: $state:ident, $kind:ident) => { Kind::Behaviours($state) };
     (learn: $state:ident, $lesson:ident) => {
         $state.learn($lesson.sample, $lesson.ranking, $lesson.fitness)
     };
@@ -53,10 +69,19 @@ macro_rules! kind {
     };
 }
 
-/// Declares the algorithms: the state of each, its description, its start. Those `in Repertoire`
-/// learn from fitness and descriptors, all others from fitness. A *form* is another state of a
-/// described algorithm, which its parameters choose. Append groups, because the place of a row is
-/// part of the format of keyframes.
+/// What an algorithm learns from beside fitness; empty for those that learn from fitness alone.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct BesideFitness {
+    /// The grid of descriptors, for algorithms that evolve a repertoire.
+    pub axes: Vec<Axis>,
+    /// The aims beside fitness, for algorithms that evolve a front.
+    pub aims: Vec<Direction>,
+}
+
+/// Declares the algorithms: the state of each, its description, its start. Those `in` a repertoire
+/// learn from fitness and descriptors, those `in Front` from fitness and aims, all others from
+/// fitness. A *form* is another state of a described algorithm, which its parameters choose. Append
+/// groups, because the place of a row is part of the format of keyframes.
 macro_rules! registry {
     ($(
         described { $($(#[$doc:meta])* $module:ident::$name:ident $(in $repertoire:ident)?,)* }
@@ -76,16 +101,17 @@ macro_rules! registry {
 
         impl Algorithm {
             /// The algorithm of this name before its first generation; `None` if no algorithm has
-            /// this name. `d`: number of genes of the population, at least 1. `axes`: the grid of
-            /// descriptors, for algorithms that learn from them.
-            pub fn new(name: &str, params: &Params, d: usize, axes: &[Axis]) -> Option<Self> {
+            /// this name. `d`: number of genes of the population, at least 1.
+            pub fn new(name: &str, params: &Params, d: usize, beside: &BesideFitness) -> Option<Self> {
                 $($(if name == <$form_module::$form as Form>::DESCRIPTION.name
                     && let Some(form) = Form::start(params, d)
                 {
                     return Some(Self::$form(form));
                 })*)*
                 $($(if name == kind!(description: $module::$name $(, $repertoire)?).name {
-                    return Some(Self::$name(kind!(start: params, d, axes $(, $repertoire)?)));
+                    return Some(Self::$name(kind!(
+                        start: $module::$name, params, d, beside $(, $repertoire)?
+                    )));
                 })*)*
                 None
             }
@@ -159,12 +185,28 @@ registry! {
         /// CMA-ES that restarts.
         restarts::RestartingCmaEs,
     }
+
+    described {
+        /// Those unlike all others.
+        novelty::Novelty in Repertoire,
+        /// Emitters with full covariances.
+        cma_mae::CmaMae in Annealing,
+        /// Emitters with diagonal covariances.
+        cma_mae::SepCmaMae in Annealing,
+    }
+    forms {}
+
+    described {
+        /// Those that no other one dominates.
+        nsga2::Nsga2 in Front,
+    }
+    forms {}
 }
 
 /// An algorithm by what it learns from.
 enum Kind<'a> {
     Strategy(&'a dyn Strategy),
-    Repertoire(&'a dyn Behaviours),
+    Behaviours(&'a dyn Behaviours),
 }
 
 /// The draws of an algorithm for one generation.
@@ -187,6 +229,23 @@ impl Sample {
     pub fn new(genotypes: Vec<Genotype>, normals: Vec<Vec<f64>>) -> Self {
         let genotypes = genotypes.into();
         Self { genotypes, normals, steps: Vec::new(), uniforms: Vec::new() }
+    }
+}
+
+/// The draws of a distribution, as in [`Sample`].
+#[derive(Default)]
+pub struct Draws {
+    /// See [`Sample::genotypes`].
+    pub genotypes: Vec<Genotype>,
+    /// See [`Sample::normals`].
+    pub normals: Vec<Vec<f64>>,
+    /// See [`Sample::steps`].
+    pub steps: Vec<Vec<f64>>,
+}
+
+impl From<Draws> for Sample {
+    fn from(Draws { genotypes, normals, steps }: Draws) -> Self {
+        Self { steps, ..Self::new(genotypes, normals) }
     }
 }
 
@@ -279,7 +338,7 @@ impl Algorithm {
     pub fn n_genes(&self) -> usize {
         match self.kind() {
             Kind::Strategy(strategy) => strategy.n_genes(),
-            Kind::Repertoire(repertoire) => repertoire.n_genes(),
+            Kind::Behaviours(behaviours) => behaviours.n_genes(),
         }
     }
 
@@ -298,7 +357,7 @@ impl Algorithm {
     pub fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
         match self.kind() {
             Kind::Strategy(strategy) => strategy.sample(population_size, rng),
-            Kind::Repertoire(repertoire) => repertoire.sample(population_size, rng),
+            Kind::Behaviours(behaviours) => behaviours.sample(population_size, rng),
         }
     }
 
@@ -321,22 +380,22 @@ impl Algorithm {
     pub fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
         match self.kind() {
             Kind::Strategy(strategy) => strategy.births(population_size, rng),
-            Kind::Repertoire(repertoire) => Some(repertoire.births(population_size, rng)),
+            Kind::Behaviours(behaviours) => behaviours.births(population_size, rng),
         }
     }
 
-    /// Its repertoire, if it has one.
-    pub fn repertoire(&self) -> Option<&dyn Behaviours> {
+    /// Its repertoire or its front, if it has one.
+    pub fn behaviours(&self) -> Option<&dyn Behaviours> {
         match self.kind() {
             Kind::Strategy(_) => None,
-            Kind::Repertoire(repertoire) => Some(repertoire),
+            Kind::Behaviours(behaviours) => Some(behaviours),
         }
     }
 
     fn strategy(&self) -> Option<&dyn Strategy> {
         match self.kind() {
             Kind::Strategy(strategy) => Some(strategy),
-            Kind::Repertoire(_) => None,
+            Kind::Behaviours(_) => None,
         }
     }
 

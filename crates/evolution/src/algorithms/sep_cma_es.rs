@@ -9,7 +9,7 @@ use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom, Params};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Described, Sample, Strategy,
+    Described, Draws, Sample, Strategy,
     cumulation::{Cumulation, Rates, VARIANCE_MAX, damping},
     draw_normal, draw_normals, mirror,
     parameters::{MU_INIT, SIGMA_INIT},
@@ -39,17 +39,26 @@ impl Described for SepCmaEs {
         parameters: &[MU_INIT, SIGMA_INIT],
     };
 
-    /// C = I.
     fn start(params: &Params, d: usize) -> Self {
-        Self {
-            mean: vec![params.value_of(&MU_INIT); d],
-            variances: vec![1.0; d],
-            cumulation: Cumulation::new(params.value_of(&SIGMA_INIT), d),
-        }
+        Self::from_mean(vec![params.value_of(&MU_INIT); d], params.value_of(&SIGMA_INIT))
     }
 }
 
 impl SepCmaEs {
+    /// A first distribution, with C = I.
+    pub fn from_mean(mean: Vec<f64>, sigma: f64) -> Self {
+        let d = mean.len();
+        Self { mean, variances: vec![1.0; d], cumulation: Cumulation::new(sigma, d) }
+    }
+
+    /// x_i = m + sigma * C^(1/2) z_i, z_i ~ N(0, I).
+    pub fn draw(&self, n: usize, rng: &mut Stream) -> Draws {
+        let deviations = self.deviations();
+        let normals = draw_normals(n, self.mean.len(), rng);
+        let genotypes = normals.iter().map(|z| self.genotype(&deviations, z)).collect();
+        Draws { genotypes, normals, steps: Vec::new() }
+    }
+
     /// sigma * C^(1/2).
     fn deviations(&self) -> Vec<f64> {
         self.variances.iter().map(|c| self.cumulation.sigma * c.sqrt()).collect()
@@ -75,12 +84,8 @@ impl Strategy for SepCmaEs {
         Some(&self.mean)
     }
 
-    /// x_i = m + sigma * C^(1/2) z_i, z_i ~ N(0, I).
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let deviations = self.deviations();
-        let normals = draw_normals(population_size, self.mean.len(), rng);
-        let genotypes = normals.iter().map(|z| self.genotype(&deviations, z)).collect();
-        Sample::new(genotypes, normals)
+        self.draw(population_size, rng).into()
     }
 
     fn draws_one_by_one(&self) -> bool {

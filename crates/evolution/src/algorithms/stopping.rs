@@ -27,10 +27,10 @@ pub enum Verdict {
 }
 
 const RANGE_MIN: f64 = 1e-11;
-const RANGE_OF_BEST_MIN: f64 = 1e-12;
+pub const RANGE_OF_BEST_MIN: f64 = 1e-12;
 /// The package's 1e-11 is below the smallest deviation of the distribution.
-const DEVIATION_MIN: f64 = 1e-9;
-const CONDITION_MAX: f64 = 1e14;
+pub const DEVIATION_MIN: f64 = 1e-9;
+pub const CONDITION_MAX: f64 = 1e14;
 
 /// Fewest iterations that show that fitness is flat.
 const FLAT_ITERATIONS_MIN: usize = 10;

@@ -98,7 +98,7 @@ fn n_evaluations(case: &Case, start: &Evolution, seed: u64) -> usize {
 
 fn assert_converges(name: &str, params: &Params, cases: &[Case]) {
     for case in cases {
-        let algorithm = Algorithm::new(name, params, case.d, &[]).unwrap();
+        let algorithm = Algorithm::new(name, params, case.d, &BesideFitness::default()).unwrap();
         let start = evolution_of(vec![algorithm], case.population_size);
         // The median is within the budget if six of the eleven seeds are.
         let within = |seed: &u64| n_evaluations(case, &start, *seed) <= case.budget;

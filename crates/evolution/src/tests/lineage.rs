@@ -25,7 +25,7 @@ fn bred(crossover: &str, n_generations: u64) -> (Vec<Population>, Pedigree) {
         told.trial_fitness[4][0] = f64::NAN;
         genotypes.push(asked.genotypes);
         pedigree.push(births, &told);
-        evolution.replay(&told).unwrap();
+        evolution.repeat(&told).unwrap();
     }
     (genotypes, pedigree)
 }
@@ -94,7 +94,7 @@ fn families_have_parents_of_the_pedigree_with_fitness_of_parent_and_child() {
                 }
             }
         }
-        evolution.replay(&told).unwrap();
+        evolution.repeat(&told).unwrap();
         before = Some(told);
     }
     let distribution = Setup::new("SNES", D).start().unwrap();
@@ -114,7 +114,7 @@ fn a_lineage_ends_where_its_pedigree_begins_and_a_distribution_has_none() {
         if generation > 0 {
             later.push(births, &told);
         }
-        evolution.replay(&told).unwrap();
+        evolution.repeat(&told).unwrap();
     }
     let lineage = later.trace(8);
     assert!(lineage.iter().all(|ancestor| ancestor.birth.is_some() == (ancestor.generation == 2)));

@@ -64,7 +64,8 @@ pub fn start(
     segment_lens: &[usize],
     population_size: usize,
 ) -> Evolution {
-    let algorithm = |&d: &usize| Algorithm::new(name, params, d, &[]).unwrap();
+    let algorithm =
+        |&d: &usize| Algorithm::new(name, params, d, &BesideFitness::default()).unwrap();
     evolution_of(segment_lens.iter().map(algorithm).collect(), population_size)
 }
 

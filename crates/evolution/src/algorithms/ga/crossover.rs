@@ -131,6 +131,7 @@ mod tests {
     use determinism::random::Purpose;
 
     use super::*;
+    use crate::tests::ks_statistic;
 
     const D: usize = 7;
     const A: [f64; D] = [0.0; D];
@@ -138,18 +139,6 @@ mod tests {
 
     fn rng() -> Stream {
         Stream::new(2, 0, 0, Purpose::Evolution, 0)
-    }
-
-    /// Largest distance between the values' distribution and `cdf` (Kolmogorov, Smirnov), times
-    /// sqrt(n). If they agree, it exceeds 1.95 once in 1000 times.
-    fn ks_statistic(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
-        values.sort_by(f64::total_cmp);
-        let n = values.len() as f64;
-        let distance = values.iter().enumerate().map(|(i, &value)| {
-            let expected = cdf(value);
-            (expected - i as f64 / n).abs().max((expected - (i + 1) as f64 / n).abs())
-        });
-        distance.fold(0.0, f64::max) * n.sqrt()
     }
 
     #[test]

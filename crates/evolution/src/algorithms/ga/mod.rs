@@ -159,14 +159,19 @@ impl Strategy for Ga {
     }
 
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {
-        let finite = || ranking.iter().filter(|&&i| fitness[i].is_finite());
-        self.ranked = finite().map(|&i| sample.genotypes[i].clone()).collect();
-        self.fitness = finite().map(|&i| fitness[i]).collect();
+        let finite = ranking.iter().filter(|&&i| fitness[i].is_finite());
+        self.fitness.clear();
+        self.fitness.extend(finite.clone().map(|&i| fitness[i]));
+        // The new genotypes take the memory of the former ones.
+        self.ranked.resize_with(self.fitness.len(), Vec::new);
+        for (ranked, &i) in self.ranked.iter_mut().zip(finite) {
+            ranked.clone_from(&sample.genotypes[i]);
+        }
     }
 }
 
 /// A uniformly random permutation (Fisher, Yates).
-fn shuffle(items: &mut [usize], rng: &mut Stream) {
+pub fn shuffle(items: &mut [usize], rng: &mut Stream) {
     for i in (1..items.len()).rev() {
         items.swap(i, rng.below(i + 1));
     }

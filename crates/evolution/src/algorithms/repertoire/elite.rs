@@ -1,7 +1,12 @@
 //! Elites: genotypes with the evidence of all trials that they have met.
 
-use experiment_file::DescriptorConfig;
-use serde::{Deserialize, Serialize};
+use std::{
+    iter,
+    ops::{Deref, DerefMut},
+};
+
+use experiment_file::{DescriptorConfig, limits};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
 use crate::Genotype;
 
@@ -50,18 +55,69 @@ pub struct Elite {
     /// The sum of its fitness over these trials.
     fitness: f64,
     /// The sum of each descriptor over these trials.
-    descriptors: Vec<f64>,
+    descriptors: Point,
 }
 
 /// The means of an individual over all trials that it has met.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
     /// Mean fitness.
     pub fitness: f64,
     /// Mean descriptors, 0 at the beginning of their ranges and 1 at their ends.
-    pub point: Vec<f64>,
+    pub point: Point,
     /// The cell of the mean descriptors.
     pub cell: usize,
+}
+
+/// The coordinates of a behaviour, or their sums. It needs no memory of its own, because a
+/// generation looks at thousands of behaviours several times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    coordinates: [f64; limits::DESCRIPTORS],
+    n: usize,
+}
+
+impl Deref for Point {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.coordinates[..self.n]
+    }
+}
+
+impl DerefMut for Point {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.coordinates[..self.n]
+    }
+}
+
+impl Serialize for Point {
+    /// As a list.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (**self).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Point {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let values = Vec::deserialize(deserializer)?;
+        let n = values.len();
+        let is_short = n <= limits::DESCRIPTORS;
+        let point = is_short.then(|| values.into_iter().collect());
+        point.ok_or_else(|| Error::invalid_length(n, &"at most 8 descriptors"))
+    }
+}
+
+impl FromIterator<f64> for Point {
+    /// Takes as many coordinates as there may be descriptors.
+    fn from_iter<I: IntoIterator<Item = f64>>(values: I) -> Self {
+        let (mut coordinates, mut n) = ([0.0; limits::DESCRIPTORS], 0);
+        for (coordinate, value) in coordinates.iter_mut().zip(values) {
+            *coordinate = value;
+            n += 1;
+        }
+        Self { coordinates, n }
+    }
 }
 
 impl Elite {
@@ -73,7 +129,7 @@ impl Elite {
             individual,
             n_trials: 0,
             fitness: 0.0,
-            descriptors: vec![0.0; n_descriptors],
+            descriptors: iter::repeat_n(0.0, n_descriptors).collect(),
         }
     }
 
@@ -108,14 +164,17 @@ impl Elite {
 
     /// Its means, on the grid of these axes.
     pub fn evidence(&self, axes: &[Axis]) -> Evidence {
-        let means = self.descriptors();
-        let cell = |cell: usize, (axis, value): (&Axis, &f64)| {
-            cell * axis.n_cells as usize + axis.cell(*value) as usize
+        let means: Point = self.descriptors.iter().map(|sum| sum / self.n_trials as f64).collect();
+        let cell = |cell: usize, (axis, &value): (&Axis, &f64)| {
+            let of_earlier = cell.saturating_mul(axis.n_cells as usize);
+            of_earlier.saturating_add(axis.cell(value) as usize)
         };
+        // No grid has more cells, but a state that a stranger made might claim so.
+        let cell_max = limits::ELITES as usize - 1;
         Evidence {
             fitness: self.fitness(),
-            cell: axes.iter().zip(&means).fold(0, cell),
-            point: axes.iter().zip(&means).map(|(axis, value)| axis.scaled(*value)).collect(),
+            cell: axes.iter().zip(&*means).fold(0, cell).min(cell_max),
+            point: axes.iter().zip(&*means).map(|(axis, value)| axis.scaled(*value)).collect(),
         }
     }
 }

@@ -8,15 +8,23 @@
 //! et al.: "Extract-QD framework", arXiv 2502.06585). All trials of an elite's life count.
 
 mod elite;
+pub mod kept;
+mod nearest;
 
-use determinism::random::Stream;
-use experiment_file::{AlgorithmDescription, Parameter, Params};
+use determinism::{
+    Isa,
+    random::Stream,
+    simd::{Simd, WithSimd},
+};
+use experiment_file::{AlgorithmDescription, Direction, Parameter, Params};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 pub use elite::{Axis, Elite, Evidence};
+pub use nearest::{Nearest, Neighbours, square};
 
+use self::kept::Family;
 use super::Sample;
-use crate::{Birth, Evaluations, Genotype, Parents};
+use crate::{Birth, Evaluations, Genotype};
 
 /// Share of a generation that are elites.
 pub const REEVALUATED: Parameter = Parameter::between(
@@ -45,13 +53,19 @@ pub trait Rule: Sized {
     /// the grid.
     fn start(params: &Params, n_cells: usize) -> Self;
 
-    /// The survivors of a pool, by their places in it, in ascending order. Those that have been in
-    /// the repertoire before come first, in the order in which they came.
-    fn survivors(&self, pool: &[Evidence]) -> Vec<usize>;
+    /// The survivors of a pool, by their places in it, in ascending order. The `n_kept` that have
+    /// been in the repertoire before come first, in the order in which they came.
+    fn survivors(&self, pool: &[Evidence], n_kept: usize) -> Vec<usize>;
 
     /// The elites among the survivors; the others are in reserve.
     fn elites(&self, survivors: &[Evidence]) -> Vec<usize> {
         (0..survivors.len()).collect()
+    }
+
+    /// By what the better of two elites, drawn uniformly, becomes a parent; `None` if each elite
+    /// that is drawn does.
+    fn merits(&self, _kept: &[Evidence]) -> Option<Vec<f64>> {
+        None
     }
 }
 
@@ -69,6 +83,9 @@ pub struct Repertoire<R> {
 }
 
 impl<R: Rule> Repertoire<R> {
+    /// See [`Rule::DESCRIPTION`].
+    pub const DESCRIPTION: AlgorithmDescription = R::DESCRIPTION;
+
     /// An empty repertoire, over `d` genes and the grid of these axes.
     pub fn start(params: &Params, d: usize, axes: &[Axis]) -> Self {
         Self {
@@ -86,33 +103,38 @@ impl<R: Rule> Repertoire<R> {
         self.kept.iter().map(|elite| elite.evidence(&self.axes)).collect()
     }
 
-    /// The kept individuals that the next generation evaluates again: those with the fewest trials,
-    /// elites before the reserve.
-    fn again(&self, population_size: usize, elites: &[usize]) -> Vec<usize> {
-        let wanted = (self.reevaluated * population_size as f64).round() as usize;
-        let n = wanted.min(self.kept.len()).min(population_size - 1);
-        let mut is_reserve = vec![true; self.kept.len()];
-        elites.iter().for_each(|&elite| is_reserve[elite] = false);
-        let mut order: Vec<usize> = (0..self.kept.len()).collect();
-        order.sort_by_key(|&i| (self.kept[i].n_trials, is_reserve[i], i));
-        order.truncate(n);
-        order
+    /// Number of individuals that the next generation evaluates again.
+    pub fn n_again(&self, population_size: usize) -> usize {
+        kept::n_again(&self.kept, self.reevaluated, population_size)
     }
 
-    /// The first generation, U(0, 1)^d. Later ones have elites to evaluate again, and then children.
-    /// Parents are named by their places.
+    /// The individuals that the next generation evaluates again, for variation of another kind.
+    pub fn evaluated_again(&self, population_size: usize) -> Vec<&Elite> {
+        let elites = self.rule.elites(&self.evidence());
+        self.again(population_size, &elites).into_iter().map(|i| &self.kept[i]).collect()
+    }
+
+    /// The places of these individuals: those with the fewest trials, elites before the reserve.
+    fn again(&self, population_size: usize, elites: &[usize]) -> Vec<usize> {
+        kept::again(&self.kept, self.n_again(population_size), elites)
+    }
+
+    /// The first generation, U(0, 1)^d. Later ones have elites to evaluate again, and then
+    /// children. Parents are named by their places.
     fn draw(&self, population_size: usize, rng: &mut Stream) -> Vec<(Genotype, Family)> {
         if self.kept.is_empty() {
             let mut genes = || (0..self.d).map(|_| rng.uniform()).collect();
             return (0..population_size).map(|_| (genes(), Family::None)).collect();
         }
-        let elites = self.rule.elites(&self.evidence());
+        let evidence = self.evidence();
+        let elites = self.rule.elites(&evidence);
+        let merits = self.rule.merits(&evidence);
         let again = self.again(population_size, &elites);
         let n_children = population_size - again.len();
         let mut drawn: Vec<(Genotype, Family)> = Vec::with_capacity(population_size);
         drawn.extend(again.iter().map(|&i| (self.kept[i].genotype.clone(), Family::Again(i))));
         for _ in 0..n_children {
-            let [a, b] = [(); 2].map(|()| elites[rng.below(elites.len())]);
+            let [a, b] = [(); 2].map(|()| parent(&elites, merits.as_deref(), rng));
             drawn.push((self.child(a, b, rng), Family::Line(a, b)));
         }
         drawn
@@ -124,31 +146,71 @@ impl<R: Rule> Repertoire<R> {
         let along = self.line_sigma * rng.normal();
         let mut child = vec![0.0; self.d];
         rng.fill_normal(&mut child);
-        for ((gene, a), b) in child.iter_mut().zip(a).zip(b) {
-            *gene = (a + self.iso_sigma * *gene + along * (b - a)).clamp(0.0, 1.0);
-        }
+        let iso_sigma = self.iso_sigma;
+        Isa::best().run(Line { child: &mut child, a, b, iso_sigma, along });
         child
     }
 }
 
-/// The parents of an individual, by their places in the repertoire.
-#[derive(Clone, Copy)]
-enum Family {
-    None,
-    Again(usize),
-    Line(usize, usize),
+/// Makes a child of normals.
+struct Line<'a> {
+    child: &'a mut [f64],
+    a: &'a [f64],
+    b: &'a [f64],
+    iso_sigma: f64,
+    along: f64,
 }
 
-/// What evolution needs of a repertoire, whatever its rule.
+impl WithSimd for Line<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for ((gene, a), b) in self.child.iter_mut().zip(self.a).zip(self.b) {
+            *gene = (a + self.iso_sigma * *gene + self.along * (b - a)).clamp(0.0, 1.0);
+        }
+    }
+}
+
+/// One of the elites: drawn uniformly, or the one of more merit of two that are.
+fn parent(elites: &[usize], merits: Option<&[f64]>, rng: &mut Stream) -> usize {
+    let mut draw = || elites[rng.below(elites.len())];
+    match merits {
+        None => draw(),
+        Some(merits) => {
+            let (a, b) = (draw(), draw());
+            if merits[b] > merits[a] { b } else { a }
+        }
+    }
+}
+
+/// What evolution needs of a repertoire, whatever its rule, or of a front.
 pub trait Behaviours {
     /// Number of genes of an individual.
     fn n_genes(&self) -> usize;
 
-    /// Number of individuals that it keeps: elites and reserve.
+    /// Number of individuals that it keeps: elites and others.
     fn n_kept(&self) -> usize;
 
-    /// The axes of the grid.
-    fn axes(&self) -> &[Axis];
+    /// Number of matrices with a row and a column per gene that it keeps.
+    fn n_matrices(&self) -> usize {
+        0
+    }
+
+    /// The axes of the grid of a repertoire; none of a front.
+    fn axes(&self) -> &[Axis] {
+        &[]
+    }
+
+    /// The aims of a front beside fitness; none of a repertoire.
+    fn aims(&self) -> &[Direction] {
+        &[]
+    }
+
+    /// Number of descriptors of a trial.
+    fn n_descriptors(&self) -> usize {
+        self.axes().len() + self.aims().len()
+    }
 
     /// The elites, in the order in which they came.
     fn elites(&self) -> Vec<&Elite>;
@@ -156,8 +218,9 @@ pub trait Behaviours {
     /// Draws `population_size` individuals. A pure function of the state and the stream.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample;
 
-    /// The births of the individuals that [`sample`](Self::sample) draws from the same stream.
-    fn births(&self, population_size: usize, rng: &mut Stream) -> Vec<Birth>;
+    /// The births of the individuals that [`sample`](Self::sample) draws from the same stream;
+    /// `None` if they have no parents.
+    fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>>;
 
     /// Learns from a generation that [`sample`](Self::sample) drew from this state. An individual
     /// stays out, or leaves, if a number of its trials is not finite.
@@ -187,50 +250,17 @@ impl<R: Rule + Serialize + DeserializeOwned> Behaviours for Repertoire<R> {
         Sample::new(drawn.map(|(genes, _)| genes).collect(), Vec::new())
     }
 
-    fn births(&self, population_size: usize, rng: &mut Stream) -> Vec<Birth> {
-        let birth = |(child, family): (Genotype, Family)| {
-            let born = |place: usize| self.kept[place].born();
-            let (parents, places) = match family {
-                Family::None => (Parents::None, vec![]),
-                Family::Again(a) => (Parents::Again(born(a)), vec![a]),
-                Family::Line(a, b) => (Parents::Line(born(a), born(b)), vec![a, b]),
-            };
-            let genes: Vec<&Genotype> =
-                places.iter().map(|&place| &self.kept[place].genotype).collect();
-            Birth::new(parents, &child, &genes)
-        };
-        self.draw(population_size, rng).into_iter().map(birth).collect()
+    fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
+        Some(kept::births(&self.kept, self.draw(population_size, rng)))
     }
 
     fn learn(&mut self, generation: u64, sample: &Sample, told: Evaluations<'_>) {
-        let rows = told.fitness.iter().zip(told.descriptors).enumerate();
-        let elites = self.rule.elites(&self.evidence());
-        let again = match self.kept.is_empty() {
-            true => Vec::new(),
-            false => self.again(sample.genotypes.len(), &elites),
-        };
-        for (&place, (_, (fitness, descriptors))) in again.iter().zip(rows.clone()) {
-            self.kept[place].add(fitness, descriptors);
-        }
-        self.kept.retain(Elite::is_finite);
-        let newcomer = |(i, (fitness, descriptors)): (usize, (&Vec<f64>, &Vec<f64>))| {
-            let mut elite = Elite::new(generation, i as u32, self.axes.len());
-            elite.add(fitness, descriptors);
-            elite.is_finite().then_some(elite)
-        };
-        let newcomers: Vec<Elite> = rows.skip(again.len()).filter_map(newcomer).collect();
-        let mut pool = self.evidence();
-        pool.extend(newcomers.iter().map(|elite| elite.evidence(&self.axes)));
-        let survivors = self.rule.survivors(&pool);
-        let mut stays = vec![false; pool.len()];
-        survivors.iter().for_each(|&place| stays[place] = true);
-        let (of_kept, of_newcomers) = stays.split_at(self.kept.len());
-        let mut of_kept = of_kept.iter();
-        self.kept.retain(|_| of_kept.next() == Some(&true));
-        let stay = newcomers.into_iter().zip(of_newcomers).filter(|(_, stays)| **stays);
-        self.kept.extend(stay.map(|(mut elite, _)| {
-            elite.genotype.clone_from(&sample.genotypes[elite.individual as usize]);
-            elite
-        }));
+        let evidence = self.evidence();
+        let again = self.again(sample.genotypes.len(), &self.rule.elites(&evidence));
+        let Self { axes, rule, kept, .. } = self;
+        let results = kept::Results { generation, genotypes: &sample.genotypes, told };
+        let view = |elite: &Elite| elite.evidence(axes);
+        let survivors = |pool: &[Evidence], n_kept| rule.survivors(pool, n_kept);
+        kept::learn(kept, evidence, &again, &results, view, survivors);
     }
 }

@@ -10,16 +10,16 @@ use super::{
 
 /// A repeated generation.
 #[derive(Debug)]
-pub struct Replay<'a> {
+pub struct Repeated<'a> {
     /// Its summary.
     pub summary: GenerationSummary,
     /// Its evaluations: the generation, then each block of the re-evaluation after it.
-    pub rounds: Vec<Round<'a>>,
+    pub evaluated: Vec<Evaluated<'a>>,
 }
 
 /// Genotypes that were evaluated together.
 #[derive(Debug, Clone)]
-pub struct Round<'a> {
+pub struct Evaluated<'a> {
     /// The trials.
     pub trial_set: TrialSet,
     /// The genotypes.
@@ -38,7 +38,7 @@ pub struct Outcome<'a> {
     /// The last link of the digest chain that covers everything.
     pub digest: Digest,
     /// The evaluations at the end of the run.
-    pub rounds: Vec<Round<'a>>,
+    pub evaluated: Vec<Evaluated<'a>>,
 }
 
 impl Evolution {
@@ -48,14 +48,14 @@ impl Evolution {
     /// # Errors
     ///
     /// If `told` does not fit this state, or has no finite fitness.
-    pub fn replay<'a>(&mut self, told: &'a Told) -> Result<Replay<'a>, CheckpointError> {
+    pub fn repeat<'a>(&mut self, told: &'a Told) -> Result<Repeated<'a>, CheckpointError> {
         let generation = self.ask();
         let misfit = CheckpointError::Misfit { generation: generation.index };
         let n_descriptors = self.n_descriptors();
         if !told.has_shape(generation.genotypes.len(), n_descriptors) {
             return Err(misfit);
         }
-        let mut rounds = vec![Round {
+        let mut evaluated = vec![Evaluated {
             trial_set: TrialSet::Generation(generation.index),
             genotypes: generation.genotypes.clone(),
             values: match n_descriptors {
@@ -66,10 +66,11 @@ impl Evolution {
         }];
         let summary = self.tell(generation, told)?;
         if !told.blocks.is_empty() {
-            let reevaluation = self.repeat(&told.blocks, &mut rounds).ok_or(misfit)?;
+            let reevaluation =
+                self.repeat_reevaluation(&told.blocks, &mut evaluated).ok_or(misfit)?;
             self.set_champion(&reevaluation);
         }
-        Ok(Replay { summary, rounds })
+        Ok(Repeated { summary, evaluated })
     }
 
     /// The result of the run, if the latest generation is its last one. `told`: the entry of that
@@ -81,11 +82,12 @@ impl Evolution {
     pub fn outcome<'a>(&self, told: &'a Told) -> Result<Outcome<'a>, CheckpointError> {
         let generation = self.n_generations().saturating_sub(1);
         let misfit = || CheckpointError::Misfit { generation };
-        let mut rounds = Vec::new();
+        let mut evaluated = Vec::new();
         let mut last = self.clone();
         let has_blocks = !told.blocks.is_empty() || !told.end.blocks.is_empty();
         if !told.end.blocks.is_empty() {
-            let reevaluation = last.repeat(&told.end.blocks, &mut rounds).ok_or_else(misfit)?;
+            let reevaluation =
+                last.repeat_reevaluation(&told.end.blocks, &mut evaluated).ok_or_else(misfit)?;
             last.set_champion(&reevaluation);
         }
         let digest = if has_blocks { last.champion_digest() } else { last.digest() };
@@ -93,13 +95,13 @@ impl Evolution {
             if !told.end.elites.is_empty() {
                 return Err(misfit());
             }
-            return Ok(Outcome { champion: last.champion().cloned(), digest, rounds });
+            return Ok(Outcome { champion: last.champion().cloned(), digest, evaluated });
         }
         let judgement = last.judgement().ok_or_else(misfit)?;
         if !judgement.fits(&told.end) {
             return Err(misfit());
         }
-        let round = |genotypes, values, values_per_trial| Round {
+        let new = |genotypes, values, values_per_trial| Evaluated {
             trial_set: judgement.trial_set(),
             genotypes,
             values,
@@ -107,20 +109,20 @@ impl Evolution {
         };
         let genotypes = judgement.genotypes();
         let (champion, elites) = genotypes.split_at(1);
-        rounds.push(round(champion.into(), vec![told.end.judgement.clone()].into(), 1));
+        evaluated.push(new(champion.into(), vec![told.end.judgement.clone()].into(), 1));
         if !elites.is_empty() {
             let values = (&told.end.elites[..]).into();
-            rounds.push(round(elites.into(), values, judgement.values_per_trial()));
+            evaluated.push(new(elites.into(), values, judgement.values_per_trial()));
         }
         let (champion, digest) = judgement.decide_by(&told.end);
-        Ok(Outcome { champion: Some(champion), digest, rounds })
+        Ok(Outcome { champion: Some(champion), digest, evaluated })
     }
 
     /// Repeats a re-evaluation. Returns `None` if the blocks do not fit the candidates.
-    fn repeat<'a>(
+    fn repeat_reevaluation<'a>(
         &self,
         blocks: &'a [Vec<Vec<f64>>],
-        rounds: &mut Vec<Round<'a>>,
+        evaluated: &mut Vec<Evaluated<'a>>,
     ) -> Option<Reevaluation> {
         let mut reevaluation = self.reevaluation()?;
         for block in blocks {
@@ -130,7 +132,7 @@ impl Evolution {
             }
             let trial_set = reevaluation.trial_set();
             let values = block[..].into();
-            rounds.push(Round { trial_set, genotypes, values, values_per_trial: 1 });
+            evaluated.push(Evaluated { trial_set, genotypes, values, values_per_trial: 1 });
             reevaluation.learn(block);
         }
         reevaluation.is_over().then_some(reevaluation)
