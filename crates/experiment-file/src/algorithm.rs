@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    DescriptorConfig, FitnessFunction, FitnessParams, GenotypeQuery, NamedMap, Params, limits,
-    schema,
+    AimConfig, DescriptorConfig, FitnessFunction, FitnessParams, GenotypeQuery, NamedMap, Params,
+    limits, schema,
 };
 use crate::DefaultValue::{Depends, Empty, Null, Required};
 use crate::Domain;
@@ -33,9 +33,12 @@ parameters! {
         fitness_params: FitnessParams =
             of(Domain::Object(FitnessParams::OBJECT), Empty).recent(),
         /// What tells behaviours apart, for algorithms that evolve a repertoire of different ones
-        /// (MAP-Elites, DNS). A single descriptor needs no list.
+        /// (MAP-Elites, DNS, novelty, CMA-MAE, sep-CMA-MAE). A single descriptor needs no list.
         descriptors: Vec<DescriptorConfig> =
             of(Domain::Objects(DescriptorConfig::OBJECT, limits::DESCRIPTORS), Null),
+        /// What counts beside fitness, for algorithms that evolve a front of compromises (NSGA-II).
+        /// A single aim needs no list.
+        aims: Vec<AimConfig> = of(Domain::Objects(AimConfig::OBJECT, limits::AIMS), Null),
         /// Stop when the mean fitness of a generation reaches this.
         target_fitness: Option<f64> = of(Domain::QUANTITY, Null),
         /// Generations between two comparisons of candidates for the champion. The last comparison
@@ -45,8 +48,8 @@ parameters! {
         champion_trials: u32 = whole([1, limits::TRIALS], 50),
         // Digests of generations do not cover this key: they hash the canonical form with 0, which
         // omits it.
-        /// Trials that judge the champion at the end of a run, and every elite of a repertoire. They
-        /// select nothing.
+        /// Trials that judge the champion at the end of a run, and every elite of a repertoire or
+        /// of a front. They select nothing.
         judgement_trials: u32 = whole([1, limits::TRIALS], 200).unless_zero(),
     }
     parts {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::limits;
 use crate::DefaultValue::{Name, Required};
 use crate::parameters::{parameters, variants};
-use crate::{AlgorithmDescription, Domain, Parameter, Params};
+use crate::{AlgorithmDescription, Domain, LearnsFrom, Parameter, Params};
 
 /// How the values of a measure in the steps of a trial become one value.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -67,7 +67,10 @@ pub const DEPTH: Parameter = Parameter::whole(
 impl AlgorithmDescription {
     /// The largest number of elites that the algorithm keeps with these parameters. `n_cells`:
     /// number of cells of the grid.
-    pub fn elites_max(&self, params: &Params, n_cells: u64) -> u64 {
+    pub fn elites_max(&self, params: &Params, n_cells: u64, population_size: u64) -> u64 {
+        if self.learns_from == LearnsFrom::Aims {
+            return population_size;
+        }
         if self.has(ELITES.key) {
             return params.value_of::<u32>(&ELITES).into();
         }

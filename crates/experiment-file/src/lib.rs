@@ -61,6 +61,7 @@
 //! problems to a `report`. `schema` describes the same format for editors.
 
 mod actuators;
+mod aim;
 mod algorithm;
 mod bodies;
 mod check;
@@ -92,6 +93,7 @@ mod variant;
 mod world;
 
 pub use actuators::*;
+pub use aim::*;
 pub use algorithm::*;
 pub use bodies::*;
 pub use description::{AlgorithmDescription, Keeps, LearnsFrom};

@@ -35,7 +35,8 @@ pub const POPULATION: u32 = 100_000;
 pub const GENERATIONS: u64 = 10_000_000;
 /// Environment steps per trial.
 pub const STEPS: u32 = 100_000;
-/// Trials per individual.
+/// Trials of one set: of an individual in a generation, of a comparison, a judgement or an
+/// evaluation. Numbers of trials are below it.
 pub const TRIALS: u32 = 1_000;
 /// Trials per generation, over all individuals.
 pub const TRIALS_PER_GENERATION: u64 = 10_000_000;
@@ -46,11 +47,19 @@ pub const GENES_PER_GENERATION: u64 = 50_000_000;
 /// checkpoint has 10 to 20 MB. The time grows with the cube of the number of genes.
 pub const GENES_OF_FULL_MATRIX: u64 = 1_000;
 
+/// Genes of a genotype whose algorithm keeps several such matrices. At this limit, a generation
+/// takes the coordinator about a second, and the matrices take 15 MB of a checkpoint.
+pub const GENES_OF_FULL_MATRICES: u64 = 500;
+/// Distributions that share a generation.
+pub const EMITTERS: u32 = 15;
+
 /// Descriptors of a behaviour.
 pub const DESCRIPTORS: usize = 8;
-/// Elites of a repertoire, and cells of a grid of descriptors.
+/// Aims beside fitness: the volume that a front dominates is exact for three aims in all.
+pub const AIMS: usize = 2;
+/// Elites of a repertoire or of a front, and cells of a grid of descriptors.
 pub const ELITES: u32 = 16_384;
-/// Genes of all elites of a repertoire together: a checkpoint has 8 bytes for each.
+/// Genes of all elites of a repertoire or of a front together: a checkpoint has 8 bytes for each.
 pub const GENES_OF_REPERTOIRE: u64 = 10_000_000;
 
 /// Euler steps of spiking networks, ms: the shortest time constants of their synapses and

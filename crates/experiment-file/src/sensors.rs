@@ -28,13 +28,13 @@ pub(crate) const UNSUPPORTED_READINGS: &[&str] = &[
 ];
 
 /// Declares the sensors, from one row per kind: its key in `sensors`; the type of its parameters;
-/// its number of sectors, by which the budget multiplies the number of robots and lights; and its
-/// readings, each with its name in files and its length. `$dollar` is `$`, for the macro that this
-/// one makes.
+/// how often it looks at every robot and light, by which the budget multiplies their number; and
+/// its readings, each with its name in files and its length. `$dollar` is `$`, for the macro that
+/// this one makes.
 macro_rules! sensors {
     ($dollar:tt $(
         $(#[doc = $sensor_doc:literal])*
-        $key:ident: $config:ident, seen: $n_sectors:expr, {
+        $key:ident: $config:ident, seen: $n_seen:expr, {
             $(
                 $(#[doc = $reading_doc:literal])*
                 $name:literal = $query:ident: $len:expr,
@@ -76,14 +76,14 @@ macro_rules! sensors {
                 }
             }
 
-            /// Sectors of all mounted sensors.
-            pub(crate) fn n_sectors(&self) -> u32 {
-                let mut n_sectors = 0;
+            /// How often all mounted sensors look at every robot and light.
+            pub(crate) fn n_seen(&self) -> u32 {
+                let mut n_seen = 0;
                 $(
-                    let seen: fn(&$config) -> u32 = $n_sectors;
-                    n_sectors += self.$key.as_ref().map_or(0, seen);
+                    let seen: fn(&$config) -> u32 = $n_seen;
+                    n_seen += self.$key.as_ref().map_or(0, seen);
                 )*
-                n_sectors
+                n_seen
             }
         }
 

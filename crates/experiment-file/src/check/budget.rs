@@ -158,7 +158,7 @@ fn generation(
         let n_cells = DescriptorConfig::n_cells(&config.algorithm.descriptors);
         for (name, population) in &config.algorithm.populations {
             let path = algorithm.key("populations").key(name);
-            let n_elites = description.elites_max(&population.params, n_cells);
+            let n_elites = description.elites_max(&population.params, n_cells, size);
             let cost = n_elites.saturating_mul(n_genes);
             let what = "possible genes of all elites";
             let parts = [&topology, &algorithm.key("descriptors"), &algorithm.key("name")];
@@ -205,7 +205,7 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
             }
             RobotController::BraitenbergLightFollower | RobotController::ScriptController => 0,
         };
-        let sense = n_sensed * u64::from(robot.sensors.n_sectors());
+        let sense = n_sensed * u64::from(robot.sensors.n_seen());
         // A line to a light, or to a robot that is seen or heard, meets every edge and body.
         let light = robot.sensors.light_sensor.as_ref().map(|sensor| sensor.blocked_by);
         let robots = robot.sensors.distance_sensor.as_ref().map(|sensor| sensor.blocked_by);

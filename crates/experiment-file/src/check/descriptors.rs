@@ -1,7 +1,7 @@
 //! Checks the descriptors: the algorithm learns from them, and they span a grid.
 
 use crate::report::{Path, Report};
-use crate::{AlgorithmDescription, DescriptorConfig, ExperimentConfig, LearnsFrom, limits};
+use crate::{AlgorithmDescription, DescriptorConfig, ExperimentConfig, Keeps, LearnsFrom, limits};
 
 /// An example for messages.
 const EXAMPLE: &str =
@@ -16,6 +16,7 @@ pub(super) fn check(
     let path = Path::from(["algorithm", "descriptors"]);
     if let Some(algorithm) = algorithm {
         fit(config, algorithm, &path, report);
+        single_population(config, algorithm, report);
     }
     for (i, descriptor) in descriptors.iter().enumerate() {
         let path = path.index(i);
@@ -62,8 +63,18 @@ fn fit(
             format!("{name} evolves behaviours that differ; say in what, for instance {EXAMPLE}")
         });
     }
+}
+
+/// Elites of a repertoire or of a front are whole robots.
+fn single_population(
+    config: &ExperimentConfig,
+    algorithm: &AlgorithmDescription,
+    report: &Report<'_>,
+) {
+    let name = algorithm.name;
+    let name_path = Path::from(["algorithm", "name"]);
     let n_populations = config.algorithm.populations.len();
-    if n_populations > 1 {
+    if algorithm.keeps == Keeps::Repertoire && n_populations > 1 {
         let populations = Path::from(["algorithm", "populations"]);
         report.conflict(&populations, &[&name_path], || {
             format!(

@@ -4,6 +4,7 @@
 //! Each check names every place on which it relies, so that it stays silent if one of them could
 //! not be read.
 
+mod aims;
 mod bodies;
 mod budget;
 mod coverage;
@@ -29,6 +30,7 @@ pub(super) fn check(
     network::check(&config.topology, report);
     genotype::check(config, algorithm, report);
     descriptors::check(config, algorithm, report);
+    aims::check(config, algorithm, report);
     world::check(config, report);
     bodies::check(config, report);
     task::check(config, report);

@@ -46,7 +46,7 @@ pub enum Keeps {
     Matrix,
     /// A population.
     Population,
-    /// Elites of different behaviour, up to [`limits::ELITES`](crate::limits::ELITES).
+    /// Elites of a repertoire or of a front, up to [`limits::ELITES`](crate::limits::ELITES).
     Repertoire,
 }
 
@@ -59,6 +59,8 @@ pub enum LearnsFrom {
     Pairs,
     /// It learns from fitness and [descriptors](crate::DescriptorConfig).
     Descriptors,
+    /// It learns from fitness and [aims](crate::AimConfig).
+    Aims,
 }
 
 /// Number of individuals below which an algorithm learns next to nothing.

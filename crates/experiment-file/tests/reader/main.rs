@@ -1,6 +1,7 @@
 //! The reader of experiment files, from outside.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod aims;
 mod bodies;
 mod descriptors;
 mod generated;

@@ -414,7 +414,7 @@ const EVERYTHING: &[&str] = &[
     "line 19: topology.outputs.led: missing key `ensemble`",
     "line 24: topology.synapses.in.pre[1]: no ensemble or stimulus is named `DARK`; known: `H`, `OUT_MSG`, `OUT_LED`, `OUT_MODE`, `OUT_WHEELS`, `MSG`, `LIGHT`",
     "line 34: algorithm: missing key `generations`",
-    "line 35: algorithm.name: unknown name `Genetic`; known: `GA`, `SNES`, `xNES`, `CMA-ES`, `sep-CMA-ES`, `openaiES`, `PGPE`, `MAP-Elites`, `DNS`",
+    "line 35: algorithm.name: unknown name `Genetic`; known: `GA`, `SNES`, `xNES`, `CMA-ES`, `sep-CMA-ES`, `openaiES`, `PGPE`, `MAP-Elites`, `DNS`, `novelty`, `CMA-MAE`, `sep-CMA-MAE`, `NSGA-II`",
     "line 43: algorithm.populations.weights.max_vals: must be between -1000000000 and 1000000000, is 1e999",
     "line 45: algorithm.populations.neurons.objects[1]: no ensemble is named `I`; known: `H`, `OUT_MSG`, `OUT_LED`, `OUT_MODE`, `OUT_WHEELS`",
     "line 53: world.objects.bots.num_instances: must be between 1 and 10000, is 0",

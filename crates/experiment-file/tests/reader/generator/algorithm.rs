@@ -17,6 +17,10 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
         "PGPE",
         "MAP-Elites",
         "DNS",
+        "novelty",
+        "CMA-MAE",
+        "sep-CMA-MAE",
+        "NSGA-II",
     ]);
     let mut tasks = vec!["grouping"];
     if network.has_led {
@@ -29,11 +33,20 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
         tasks.push("goto_light");
     }
     let queries = network.queries(dice);
-    // Coefficients of learning are too many genes for algorithms with a full matrix.
+    // Coefficients of learning and parameters of spiking neurons may be too many genes for
+    // algorithms with a full matrix.
     let learns = queries.iter().any(|(query, _)| query.starts_with("learning:"));
-    let name = if learns && ["xNES", "CMA-ES"].contains(&name) { "sep-CMA-ES" } else { name };
-    let has_repertoire = ["MAP-Elites", "DNS"].contains(&name);
-    let n_populations = if has_repertoire { 1 } else { dice.die(queries.len().min(3)) };
+    let has_many_genes = learns || network.is_spiking();
+    let name = match name {
+        "xNES" | "CMA-ES" if has_many_genes => "sep-CMA-ES",
+        "CMA-MAE" if has_many_genes => "sep-CMA-MAE",
+        _ => name,
+    };
+    let repertoires = ["MAP-Elites", "DNS", "novelty", "CMA-MAE", "sep-CMA-MAE"];
+    let has_repertoire = repertoires.contains(&name);
+    let has_front = name == "NSGA-II";
+    let n_populations =
+        if has_repertoire || has_front { 1 } else { dice.die(queries.len().min(3)) };
     let mut populations = json!({});
     for i in 0..n_populations {
         let queries: Vec<_> = queries.iter().skip(i).step_by(n_populations).collect();
@@ -57,17 +70,38 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
     if has_repertoire {
         insert(&mut algorithm, "descriptors", descriptors(dice, task));
     }
+    if has_front {
+        insert(&mut algorithm, "aims", aims(dice, task));
+    }
     algorithm
 }
 
-fn descriptors(dice: &mut Dice, task: &str) -> Value {
-    let measures = match task {
+/// Two measures of a task; the only one twice.
+fn measures(task: &str) -> [&'static str; 2] {
+    match task {
         "identify_leader" => ["leaders", "one_leader"],
         "identify_borderline" => ["accuracy", "precision"],
         "goto_light" => ["light_distance_others", "near_light_others"],
         "grouping" => ["center_distance"; 2],
         _ => ["misalignment", "turning"],
+    }
+}
+
+fn aims(dice: &mut Dice, task: &str) -> Value {
+    let mut aim = |measure: &str| {
+        let summary = json!(dice.pick(&["mean", "end"]));
+        let mut aim = object(dice, [("of", summary)]);
+        insert(&mut aim, "measure", json!(measure));
+        insert(&mut aim, "direction", json!(dice.pick(&["maximise", "minimise"])));
+        aim
     };
+    let [one, other] = measures(task);
+    let [first, second] = [one, other].map(&mut aim);
+    if one != other && dice.chance(0.5) { json!([first, second]) } else { first }
+}
+
+fn descriptors(dice: &mut Dice, task: &str) -> Value {
+    let measures = measures(task);
     let mut descriptor = |measure: &str| {
         let summary = json!(dice.pick(&["mean", "end"]));
         let [low, width] = [dice.number(-9.0, 9.0), dice.number(0.1, 9.0)];
@@ -149,6 +183,37 @@ fn params(dice: &mut Dice, algorithm: &str) -> Value {
         "DNS" => {
             object(dice, [("reevaluated", json!(0)), ("elites", json!(100)), ("nearest", json!(5))])
         }
+        "novelty" => object(
+            dice,
+            [
+                ("reevaluated", json!(0.125)),
+                ("elites", json!(200)),
+                ("neighbours", json!(10)),
+                ("added", eta_mu),
+                ("threshold", sigma),
+            ],
+        ),
+        "CMA-MAE" | "sep-CMA-MAE" => object(
+            dice,
+            [
+                ("mu_init", mu_init),
+                ("sigma_init", sigma),
+                ("emitters", json!(3)),
+                ("archive_rate", eta_mu),
+                ("threshold_min", json!(-1.5)),
+                ("depth", json!(1)),
+            ],
+        ),
+        "NSGA-II" => object(
+            dice,
+            [
+                ("reevaluated", json!(0.5)),
+                ("crossover_prob", mu_init),
+                ("eta_c", json!(15)),
+                ("mutation_prob", decay),
+                ("eta_m", json!(7.5)),
+            ],
+        ),
         "SNES" => object(
             dice,
             [

@@ -271,6 +271,10 @@ impl Network {
     }
 
     /// Disjoint queries that match something, with their bounds.
+    pub(super) fn is_spiking(&self) -> bool {
+        self.model.is_spiking()
+    }
+
     pub(super) fn queries(&self, dice: &mut Dice) -> Vec<(String, [f64; 2])> {
         let weights: Vec<String> = match dice.below(4) {
             _ if self.groups.is_empty() => Vec::new(),

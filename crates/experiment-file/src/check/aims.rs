@@ -1,0 +1,59 @@
+//! Checks the aims: the algorithm learns from them, and its front is within its limit.
+
+use crate::report::{Path, Report};
+use crate::{AimConfig, AlgorithmDescription, ExperimentConfig, LearnsFrom, limits};
+
+/// An example for messages.
+const EXAMPLE: &str = r#""aims": {"measure": "turning", "direction": "minimise"}"#;
+
+pub(super) fn check(
+    config: &ExperimentConfig,
+    algorithm: Option<&AlgorithmDescription>,
+    report: &Report<'_>,
+) {
+    let aims = &config.algorithm.aims;
+    let path = Path::from(["algorithm", "aims"]);
+    if let Some(algorithm) = algorithm {
+        fit(config, algorithm, &path, report);
+    }
+    for (i, aim) in aims.iter().enumerate() {
+        let path = path.index(i);
+        let same =
+            |other: &AimConfig| other.measure == aim.measure && other.summarises == aim.summarises;
+        if aims[..i].iter().any(same) {
+            let message = || format!("`{}` is an aim already", aim.measure);
+            report.conflict(&path.key("measure"), &[&path.key("of")], message);
+        }
+    }
+}
+
+/// Algorithm and aims belong together.
+fn fit(
+    config: &ExperimentConfig,
+    algorithm: &AlgorithmDescription,
+    path: &Path,
+    report: &Report<'_>,
+) {
+    let name = algorithm.name;
+    let name_path = Path::from(["algorithm", "name"]);
+    if algorithm.learns_from != LearnsFrom::Aims {
+        if !config.algorithm.aims.is_empty() {
+            report.conflict(path, &[&name_path], || {
+                format!("{name} aims at fitness alone; remove them, or take `NSGA-II`")
+            });
+        }
+        return;
+    }
+    if config.algorithm.aims.is_empty() {
+        report.conflict(&name_path, &[path], || {
+            format!("{name} needs an aim beside fitness, for instance {EXAMPLE}")
+        });
+    }
+    let (size, limit) = (config.algorithm.population_size, limits::ELITES);
+    if size > limit {
+        let size_path = Path::from(["algorithm", "population_size"]);
+        report.conflict(&size_path, &[&name_path], || {
+            format!("is {size}, but {name} takes at most {limit}, because a front may have as many elites")
+        });
+    }
+}
