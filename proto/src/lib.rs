@@ -12,9 +12,6 @@ pub mod v1 {
 /// agree.
 pub const PROTOCOL_VERSION: u32 = v1::ProtocolVersion::Current as u32;
 
-/// Most items per slot that a coordinator assigns to a worker before the worker's first result.
-pub const ITEMS_PER_SLOT_MAX: usize = 64;
-
 /// Largest number of slots of a worker.
 pub const SLOTS_MAX: u32 = 4096;
 

@@ -3,7 +3,9 @@
 use std::{fs, io::Write as _, sync::OnceLock};
 
 use evolution::{ALGORITHMS, Evolution, Fork, Told};
-use experiment_file::{DescriptorConfig, ExperimentConfig, Params, Summarises};
+use experiment_file::{
+    AimConfig, DescriptorConfig, Direction, ExperimentConfig, Params, Summarises,
+};
 use sim_core::{FINGERPRINT, Simulation};
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
@@ -188,20 +190,42 @@ fn with_repertoire() -> ExperimentConfig {
     ExperimentConfig::from_json(&config.to_canonical_json(), "", ALGORITHMS).unwrap().0
 }
 
+/// The experiment with a front of two aims beside fitness.
+fn with_front() -> ExperimentConfig {
+    let mut config = config();
+    config.algorithm.name = "NSGA-II".to_owned();
+    let [leaders, turns] = [Summarises::Mean, Summarises::End].map(|summarises| AimConfig {
+        measure: "leaders".to_owned(),
+        summarises,
+        direction: Direction::Minimise,
+    });
+    config.algorithm.aims = vec![leaders, turns];
+    config.algorithm.populations[0].params = Params::default();
+    ExperimentConfig::from_json(&config.to_canonical_json(), "", ALGORITHMS).unwrap().0
+}
+
 #[test]
 fn a_repertoire_is_proven_and_a_lie_in_one_descriptor_is_found() {
-    let config = with_repertoire();
-    let honest = evolved(&config, started(&config), None, Vec::new(), |_, _| ());
+    assert_proven(&with_repertoire());
+}
+
+#[test]
+fn a_front_is_proven_and_a_lie_in_one_aim_is_found() {
+    assert_proven(&with_front());
+}
+
+fn assert_proven(config: &ExperimentConfig) {
+    let honest = evolved(config, started(config), None, Vec::new(), |_, _| ());
     let read = Bundle::read(&honest.to_bytes().unwrap()).unwrap();
     verify(&read, Sample::All).unwrap();
-    // The last number of a trial is its second descriptor.
+    // The last number of a trial is its second descriptor or aim.
     let lie = |generation: u64, values: &mut Vec<Vec<f64>>| {
         if generation == 2 {
             let last = values[1].last_mut().unwrap();
             *last = f64::from_bits(last.to_bits() ^ 1);
         }
     };
-    let lying = evolved(&config, started(&config), None, Vec::new(), lie);
+    let lying = evolved(config, started(config), None, Vec::new(), lie);
     links(&lying).unwrap();
     let flaw = verify(&lying, Sample::All).unwrap_err();
     assert_eq!(flaw.claim, Claim::Simulation, "{flaw}");
@@ -365,7 +389,7 @@ pub fn forked() -> Bundle {
     child.algorithm.generations = 5;
     let mut evolution = started(&parent);
     for entry in &bundle().log[..2] {
-        evolution.replay(&Told::from_bytes(entry).unwrap()).unwrap();
+        evolution.repeat(&Told::from_bytes(entry).unwrap()).unwrap();
     }
     let simulation = Simulation::compile(&child).unwrap();
     let fork = Fork {

@@ -7,8 +7,8 @@
 use std::{collections::BTreeSet, fmt};
 
 use evolution::{
-    ALGORITHMS, Champion, Checkpoint, CheckpointError, Digest, Evolution, Outcome, Replay, Round,
-    Told,
+    ALGORITHMS, Champion, Checkpoint, CheckpointError, Digest, Evaluated, Evolution, Outcome,
+    Repeated, Told,
 };
 use experiment_file::ExperimentConfig;
 use sim_core::{FINGERPRINT, Simulation, TrialSet, panic_to_failure};
@@ -112,8 +112,8 @@ impl Claim {
 }
 
 impl Batch {
-    fn from_round(round: Round<'_>) -> Self {
-        let Round { trial_set, genotypes, values, values_per_trial } = round;
+    fn from_evaluated(evaluated: Evaluated<'_>) -> Self {
+        let Evaluated { trial_set, genotypes, values, values_per_trial } = evaluated;
         Self { trial_set, genotypes, values: values.into_owned(), values_per_trial }
     }
 
@@ -243,7 +243,7 @@ impl<'a> Verification<'a> {
             return Err(Claim::Chain.flaw(at(&"its log entry is not in the only valid encoding")));
         }
         let row = &self.bundle.history[generation as usize];
-        let Replay { summary, rounds } = self.evolution.replay(&told).map_err(misfit)?;
+        let Repeated { summary, evaluated } = self.evolution.repeat(&told).map_err(misfit)?;
         if summary.digest != row.digest {
             let found = summary.digest;
             let what =
@@ -266,7 +266,7 @@ impl<'a> Verification<'a> {
         }
         let mut batches = Vec::new();
         if self.sample.contains(&generation) {
-            batches.extend(rounds.into_iter().map(Batch::from_round));
+            batches.extend(evaluated.into_iter().map(Batch::from_evaluated));
             let n_trials = self.n_trials as usize;
             if told.trial_fitness.iter().any(|trials| trials.len() != n_trials) {
                 return Err(
@@ -291,7 +291,7 @@ impl<'a> Verification<'a> {
     fn conclude(&mut self, told: &Told) -> Result<Vec<Batch>, Flaw> {
         let outcome = self.evolution.outcome(told);
         let outcome = outcome.map_err(|error| Claim::Champion.flaw(error))?;
-        let Outcome { champion, digest, rounds } = outcome;
+        let Outcome { champion, digest, evaluated } = outcome;
         let stated = self.bundle.manifest.digest;
         if digest != stated {
             let what = format!("the last link is {digest}, not {stated}");
@@ -302,7 +302,7 @@ impl<'a> Verification<'a> {
             return Err(Claim::Champion.flaw("the log gives another champion"));
         }
         self.champion = champion;
-        Ok(rounds.into_iter().map(Batch::from_round).collect())
+        Ok(evaluated.into_iter().map(Batch::from_evaluated).collect())
     }
 
     fn compare_keyframe(&mut self) -> Result<(), Flaw> {

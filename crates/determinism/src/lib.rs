@@ -1,6 +1,7 @@
 //! Numbers with the same bits on every machine.
 //!
 //! - [`random`]: random streams, each addressed by its purpose;
+//! - [`normal`]: quantiles of the normal distribution;
 //! - [`Isa`]: the vector instructions of a computation. They change its speed, but no bit of its
 //!   results;
 //! - [`simd`]: what these instructions compute, the same bits at every level.
@@ -23,6 +24,7 @@
 //! ```
 
 mod isa;
+pub mod normal;
 pub mod random;
 pub mod simd;
 

@@ -20,11 +20,11 @@
 
 use std::fmt;
 
-use crate::simd::{Simd, WithSimd};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
-use crate::Isa;
+use crate::normal::{standard_normal_quantile, standard_normal_quantiles};
 
 /// The purpose of a stream. The numbers are part of the format of a run: never reuse one for
 /// another purpose.
@@ -67,9 +67,9 @@ pub enum Purpose {
     AreaMovement = 15,
     /// Draws of robots whose sensors a script reads; stream = robot.
     Sensing = 16,
-    /// The pseudo-reality of a trial; stream = index of the object. Stream robot + 2^32 k gives, per
-    /// step, the noise of the robot's sensors (k = 1, one normal per value), the loss of its frame
-    /// (k = 2, one draw), and the noise of the frame's strength (k = 3, one normal).
+    /// The pseudo-reality of a trial; stream = index of the object. Stream robot + 2^32 k gives,
+    /// per step, the noise of the robot's sensors (k = 1, one normal per value), the loss of its
+    /// frame (k = 2, one draw), and the noise of the frame's strength (k = 3, one normal).
     PseudoReality = 17,
     /// The pseudo-realities of a report; trial = number of the reality, stream 0, one draw per key.
     Realities = 18,
@@ -79,7 +79,8 @@ pub enum Purpose {
 
 /// A set of trials, which determines their worlds and noise: trial t of one set has another world
 /// than trial t of any other set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum TrialSet {
     /// The trials by which evolution selects in generation g, from 0.
     Generation(u64),
@@ -190,11 +191,13 @@ impl Stream {
     }
 
     /// Uniform in \[0, 1), a multiple of 2^-53.
+    #[inline]
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 * TWO_POW_MINUS_53
     }
 
     /// Uniform in 0..n. `n` must not be 0.
+    #[inline]
     pub fn below(&mut self, n: usize) -> usize {
         debug_assert!(n > 0, "`n` is at least 1");
         // For huge n, the product can round up to n; `min` keeps it below.
@@ -202,6 +205,7 @@ impl Stream {
     }
 
     /// True with probability `p`.
+    #[inline]
     pub fn bernoulli(&mut self, p: f64) -> bool {
         self.uniform() < p
     }
@@ -234,15 +238,29 @@ impl Stream {
     /// the draws of [`fill_normal`](Self::fill_normal). It is meant for callers that draw a few
     /// numbers from each of many streams.
     pub fn fill_probability(&mut self, values: &mut [f64]) {
-        values.fill_with(|| self.probability());
+        const N: usize = 64;
+        let mut bytes = [[0; size_of::<u64>()]; N];
+        for values in values.chunks_mut(N) {
+            let bytes = &mut bytes[..values.len()];
+            self.0.fill_bytes(bytes.as_flattened_mut());
+            for (value, bytes) in values.iter_mut().zip(bytes) {
+                *value = probability(u64::from_le_bytes(*bytes));
+            }
+        }
     }
 
     /// Uniform in (0, 1).
     fn probability(&mut self) -> f64 {
-        // 52 bits, so that adding a half is exact and the quantile stays finite.
-        let k = self.0.next_u64() >> 12;
-        (k as f64 + 0.5) * TWO_POW_MINUS_52
+        probability(self.0.next_u64())
     }
+}
+
+/// The probability of a draw, (k + 0.5) * 2^-52: k has 52 bits, so that adding a half is exact and
+/// the quantile stays finite. The bits of k are the fraction of 1 + k * 2^-52, because processors
+/// convert whole numbers one by one.
+#[inline(always)]
+fn probability(draw: u64) -> f64 {
+    f64::from_bits(1.0_f64.to_bits() | (draw >> 12)) - 1.0 + TWO_POW_MINUS_53
 }
 
 /// Samples an index with probabilities proportional to `weights`, from a uniform `u` in \[0, 1):
@@ -258,156 +276,17 @@ pub fn sample(weights: &[f64], u: f64) -> usize {
     drawn.unwrap_or(weights.len() - 1)
 }
 
-const TWO_POW_MINUS_53: f64 = 1.0 / (1u64 << 53) as f64;
-const TWO_POW_MINUS_52: f64 = 1.0 / (1u64 << 52) as f64;
-
-/// Replaces probabilities in (0, 1) by the corresponding quantiles of N(0, 1).
-pub fn standard_normal_quantiles(probabilities: &mut [f64]) {
-    Isa::best().run(StandardNormalQuantiles(probabilities));
-}
-
-/// Quantile of N(0, 1) at `p` in (0, 1); Wichura, "Algorithm AS 241: The
-/// Percentage Points of the Normal Distribution", Applied Statistics 37 (1988),
-/// routine PPND16, relative accuracy about 1e-16.
-fn standard_normal_quantile(p: f64) -> f64 {
-    let q = p - 0.5;
-    if is_central(q) {
-        return central_quantile(q);
-    }
-    let tail = if q < 0.0 { p } else { 1.0 - p };
-    let r = (-libm::log(tail)).sqrt();
-    let magnitude = if r <= 5.0 {
-        let r = r - 1.6;
-        horner(&MIDDLE_NUMERATOR, r) / horner(&MIDDLE_DENOMINATOR, r)
-    } else {
-        let r = r - 5.0;
-        horner(&TAIL_NUMERATOR, r) / horner(&TAIL_DENOMINATOR, r)
-    };
-    if q < 0.0 { -magnitude } else { magnitude }
-}
-
-/// Whether `p` = q + 0.5 is in the central region, as 85 % of uniform probabilities are.
-fn is_central(q: f64) -> bool {
-    q.abs() <= 0.425
-}
-
-#[inline(always)]
-fn central_quantile(q: f64) -> f64 {
-    let r = 0.180625 - q * q;
-    q * horner(&CENTRE_NUMERATOR, r) / horner(&CENTRE_DENOMINATOR, r)
-}
-
-/// Replaces probabilities by their quantiles. It first treats all of them as central, because the
-/// compiler vectorises a loop without branches.
-struct StandardNormalQuantiles<'a>(&'a mut [f64]);
-
-impl WithSimd for StandardNormalQuantiles<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
-        const N: usize = 16;
-        for values in self.0.chunks_mut(N) {
-            let mut probabilities = [0.5; N];
-            probabilities[..values.len()].copy_from_slice(values);
-            let quantiles = probabilities.map(|p| central_quantile(p - 0.5));
-            for ((value, p), central) in values.iter_mut().zip(probabilities).zip(quantiles) {
-                *value = if is_central(p - 0.5) { central } else { standard_normal_quantile(p) };
-            }
-        }
-    }
-}
-
-/// Polynomial with the coefficients of x^0, x^1, ...
-#[inline(always)]
-fn horner(coefficients: &[f64; 8], x: f64) -> f64 {
-    coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
-}
-
-const CENTRE_NUMERATOR: [f64; 8] = [
-    3.387_132_872_796_366_5,
-    1.331_416_678_917_843_8e2,
-    1.971_590_950_306_551_3e3,
-    1.373_169_376_550_946e4,
-    4.592_195_393_154_987e4,
-    6.726_577_092_700_87e4,
-    3.343_057_558_358_813e4,
-    2.509_080_928_730_122_7e3,
-];
-const CENTRE_DENOMINATOR: [f64; 8] = [
-    1.0,
-    4.231_333_070_160_091e1,
-    6.871_870_074_920_579e2,
-    5.394_196_021_424_751e3,
-    2.121_379_430_158_66e4,
-    3.930_789_580_009_271e4,
-    2.872_908_573_572_194_3e4,
-    5.226_495_278_852_854e3,
-];
-const MIDDLE_NUMERATOR: [f64; 8] = [
-    1.423_437_110_749_683_5,
-    4.630_337_846_156_546,
-    5.769_497_221_460_691,
-    3.647_848_324_763_204_5,
-    1.270_458_252_452_368_4,
-    2.417_807_251_774_506e-1,
-    2.272_384_498_926_918_4e-2,
-    7.745_450_142_783_414e-4,
-];
-const MIDDLE_DENOMINATOR: [f64; 8] = [
-    1.0,
-    2.053_191_626_637_759,
-    1.676_384_830_183_803_8,
-    6.897_673_349_851e-1,
-    1.481_039_764_274_800_8e-1,
-    1.519_866_656_361_645_7e-2,
-    5.475_938_084_995_345e-4,
-    1.050_750_071_644_416_9e-9,
-];
-const TAIL_NUMERATOR: [f64; 8] = [
-    6.657_904_643_501_103,
-    5.463_784_911_164_114,
-    1.784_826_539_917_291_3,
-    2.965_605_718_285_048_7e-1,
-    2.653_218_952_657_612_4e-2,
-    1.242_660_947_388_078_4e-3,
-    2.711_555_568_743_487_6e-5,
-    2.010_334_399_292_288_1e-7,
-];
-const TAIL_DENOMINATOR: [f64; 8] = [
-    1.0,
-    5.998_322_065_558_88e-1,
-    1.369_298_809_227_358e-1,
-    1.487_536_129_085_061_5e-2,
-    7.868_691_311_456_133e-4,
-    1.846_318_317_510_054_8e-5,
-    1.421_511_758_316_446e-7,
-    2.044_263_103_389_939_8e-15,
-];
+pub(crate) const TWO_POW_MINUS_53: f64 = 1.0 / (1u64 << 53) as f64;
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn quantiles_match_tables() {
-        // scipy.stats.norm.ppf
-        for (p, expected) in [
-            (0.5, 0.0),
-            (0.025, -1.959963984540054),
-            (0.975, 1.959963984540054),
-            (1e-10, -6.361340902404056),
-            (0.3, -0.5244005127080409),
-            (1e-16, -8.222082216130435),
-        ] {
-            let q = standard_normal_quantile(p);
-            assert!((q - expected).abs() <= 1e-14 * expected.abs().max(1.0), "{p}: {q} {expected}");
-        }
-    }
+    use crate::Isa;
+    use crate::normal::StandardNormalQuantiles;
 
     #[test]
     fn many_normals_at_once_have_the_bits_of_single_draws() {
-        for n in [0, 1, 63, 64, 65, 10_000] {
+        for n in [0, 1, 63, 64, 65, 256, 257, 100_000] {
             let stream = Stream::new(n, 1, 0, Purpose::Evolution, 2);
             let mut one_by_one = stream.clone();
             let expected: Vec<u64> = (0..n).map(|_| one_by_one.normal().to_bits()).collect();

@@ -13,6 +13,7 @@
 //! - [`limits`]: bounds on stored data and on answers
 
 mod address;
+#[cfg(feature = "messages")]
 pub mod codec;
 #[cfg(feature = "database")]
 pub mod failpoint;

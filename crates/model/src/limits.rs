@@ -1,6 +1,11 @@
-//! Bounds on the stored data of experiments and on one answer about them, including those that
-//! clients check, too.
+//! Bounds on the stored data of experiments, on one answer about them, and on a worker's items,
+//! including those that clients and workers check, too.
 
+use std::time::Duration;
+
+/// Time for which workers must have had a round's last items before the round counts as waiting
+/// for them.
+pub const BARRIER_AFTER: Duration = Duration::from_secs(10);
 /// Number of generations that are recomputed at the same time for pages, which share the
 /// processor with the coordinator.
 pub const RECONSTRUCTIONS_OF_PAGES_MAX: usize = 1;
@@ -25,3 +30,6 @@ pub const KEY_LEN_MAX: usize = 128;
 pub const PAGE_LEN_MAX: u32 = 1000;
 /// Experiments that may be unfinished at the same time.
 pub const UNFINISHED_MAX: usize = 1000;
+/// Most items per slot that a worker has, in progress or waiting. A worker fails items that its
+/// queue of this size cannot hold, so workers with a smaller value need a new protocol version.
+pub const ITEMS_PER_SLOT_MAX: usize = 64;

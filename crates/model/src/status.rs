@@ -30,6 +30,8 @@ impl From<QueryError> for Status {
             QueryError::NoIndividual { .. }
             | QueryError::NoMean { .. }
             | QueryError::NoRepertoire { .. }
+            | QueryError::NoFront { .. }
+            | QueryError::WrongReference { .. }
             | QueryError::EmptyCell { .. }
             | QueryError::NoLineage(_) => Self::invalid_argument(text),
             QueryError::NoChampion(_)

@@ -162,3 +162,15 @@ fn judged(judged: Judged) -> v1::JudgedFitness {
     let [mean, low, high] = [mean, low, high].map(f64::from);
     v1::JudgedFitness { mean, low, high, trials: n_trials, generation }
 }
+
+/// What the fleet computes in a round: "generation 12", or the champion after it.
+pub fn round_name(round: &v1::Round) -> String {
+    let generation = round.generation;
+    if round.judgement {
+        format!("the judgement of the champion after generation {generation}")
+    } else if round.held_out {
+        format!("the re-evaluation of candidates for the champion after generation {generation}")
+    } else {
+        format!("generation {generation}")
+    }
+}

@@ -1,9 +1,9 @@
 //! The fused multiply-add of f32 in software, through f64.
 //!
-//! The product of two f32 is exact in f64. Its sum with the third is rounded to 53 bits, and then to
-//! 24 (fewer for subnormal results). Two roundings differ from one only if the first one ends midway
-//! between two f32 and was not exact; [`mul_add`] therefore rounds the sum *to odd*: an inexact sum
-//! gets the neighbour whose last bit is 1, which is midway between no two f32.
+//! The product of two f32 is exact in f64. Its sum with the third is rounded to 53 bits, and then
+//! to 24 (fewer for subnormal results). Two roundings differ from one only if the first one ends
+//! midway between two f32 and was not exact; [`mul_add`] therefore rounds the sum *to odd*: an
+//! inexact sum gets the neighbour whose last bit is 1, which is midway between no two f32.
 
 /// a * b + c, rounded once: the bits of [`f32::mul_add`], except the payload of NaN.
 #[inline(always)]

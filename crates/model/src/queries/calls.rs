@@ -31,6 +31,7 @@ macro_rules! reading_calls {
                 get_individuals(GetIndividualsRequest) -> GetIndividualsResponse;
                 get_lineage(GetLineageRequest) -> GetLineageResponse;
                 get_repertoire(GetRepertoireRequest) -> GetRepertoireResponse;
+                get_front(GetFrontRequest) -> GetFrontResponse;
                 list_dynamics(ListDynamicsRequest) -> ListDynamicsResponse;
             }
             $($rest)*

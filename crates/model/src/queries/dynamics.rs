@@ -22,7 +22,7 @@ impl Reader {
         let read = move |store: &_| {
             StoredDynamics::read(store, ExperimentId(experiment_id), from_generation)
         };
-        self.reconstruct(read, StoredDynamics::replay).await
+        self.reconstruct(read, StoredDynamics::repeat).await
     }
 }
 
@@ -59,7 +59,7 @@ impl StoredDynamics {
     }
 
     /// Repeats the generations; CPU-bound.
-    fn replay(self) -> Result<ListDynamicsResponse, QueryError> {
+    fn repeat(self) -> Result<ListDynamicsResponse, QueryError> {
         let Self { experiment, first, checkpoint, log } = self;
         let Some(checkpoint) = checkpoint else { return Ok(ListDynamicsResponse::default()) };
         let other = |what: String| QueryError::OtherBits {

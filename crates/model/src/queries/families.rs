@@ -3,7 +3,6 @@
 use std::num::NonZeroU64;
 
 use evolution::{Checkpoint, Evolution, Told};
-use experiment_file::ExperimentConfig;
 use tonic::Status;
 
 use crate::{
@@ -12,7 +11,9 @@ use crate::{
     store::{LogEntry, Store, StoredExperiment},
 };
 
-use super::{QueryError, Reader, experiment, generation::Gap, lineage::no_parents};
+use super::{
+    QueryError, Reader, config, experiment, generation::Gap, lineage::no_parents, other_bits,
+};
 
 /// Parents and children of some generations.
 #[derive(Debug, Clone, Default)]
@@ -35,7 +36,7 @@ impl Reader {
         every: NonZeroU64,
     ) -> Result<Families, Status> {
         let read = move |store: &_| StoredFamilies::read(store, ExperimentId(id), from, every);
-        self.reconstruct(read, StoredFamilies::replay).await
+        self.reconstruct(read, StoredFamilies::repeat).await
     }
 }
 
@@ -81,17 +82,10 @@ impl StoredFamilies {
     }
 
     /// Repeats the generations; CPU-bound.
-    fn replay(self) -> Result<Families, QueryError> {
+    fn repeat(self) -> Result<Families, QueryError> {
         let Self { experiment, first, every, stored } = self;
-        let other = |what: String| QueryError::OtherBits {
-            experiment: experiment.id,
-            generation: first,
-            what,
-            theirs: experiment.fingerprint.clone(),
-        };
-        let (config, _) =
-            ExperimentConfig::from_json(&experiment.config_json, "", evolution::ALGORITHMS)
-                .map_err(|error| other(error.to_string()))?;
+        let other = |what: String| other_bits(&experiment, first, what);
+        let config = config(&experiment, first)?;
         let populations: Vec<String> = config.algorithm.populations.keys().cloned().collect();
         let Some((checkpoint, log)) = stored else {
             return Ok(Families { populations, next: first, ..Families::default() });
@@ -124,8 +118,8 @@ impl StoredFamilies {
                 n_children += families.births.iter().map(Vec::len).sum::<usize>();
                 generations.push((of.generation, families));
             }
-            let replay = evolution.replay(&told).map_err(|error| other(error.to_string()))?;
-            let found = replay.summary.digest.to_string();
+            let repeated = evolution.repeat(&told).map_err(|error| other(error.to_string()))?;
+            let found = repeated.summary.digest.to_string();
             if found != of.digest {
                 return Err(other(format!("it has the digest {found}, and not {}", of.digest)));
             }
@@ -173,7 +167,7 @@ mod tests {
         every: u64,
     ) -> Result<Families, QueryError> {
         let every = NonZeroU64::new(every).unwrap();
-        StoredFamilies::read(store, id, from, every)?.replay()
+        StoredFamilies::read(store, id, from, every)?.repeat()
     }
 
     /// The generations of all pages, each with the number of its children.

@@ -1,6 +1,6 @@
 //! The fitness of every individual, generation by generation.
 
-use evolution::Told;
+use evolution::{Told, mean};
 
 use crate::{ids::ExperimentId, limits::PAGE_LEN_MAX, store::Store};
 
@@ -20,11 +20,7 @@ pub fn fitness(
     for (generation, told) in (first..).zip(log) {
         let told = told.and_then(|told| Told::from_bytes(&told).ok());
         let told = told.ok_or(QueryError::DamagedLog { experiment: id, generation })?;
-        generations.push(told.trial_fitness.iter().map(|trials| mean(trials)).collect());
+        generations.push(told.trial_fitness.iter().map(|trials| mean(trials) as f32).collect());
     }
     Ok((first, generations))
-}
-
-fn mean(values: &[f64]) -> f32 {
-    (values.iter().sum::<f64>() / values.len() as f64) as f32
 }

@@ -9,7 +9,7 @@ use crate::{
     store::{ExperimentRecord, ForkRecord, GenerationRecord, LogGap, Store, StoredExperiment},
 };
 
-use super::{QueryError, experiment};
+use super::{QueryError, experiment, other_bits};
 
 /// A stored generation: the data from which it is recomputed.
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub struct StoredGeneration {
 
 /// A recomputed generation, and its result.
 #[derive(Debug)]
-pub struct Replayed {
+pub struct RepeatedGeneration {
     /// The genotypes.
     pub generation: Generation,
     /// Their recorded fitness.
@@ -50,30 +50,24 @@ impl StoredGeneration {
     }
 
     fn other(&self, what: String) -> QueryError {
-        let Self { experiment, of, .. } = self;
-        QueryError::OtherBits {
-            experiment: experiment.id,
-            generation: of.generation,
-            what,
-            theirs: experiment.fingerprint.clone(),
-        }
+        other_bits(&self.experiment, self.of.generation, what)
     }
 
     /// Repeats the generation; CPU-bound. Fails unless genotypes and fitness have the digest of
     /// the history.
-    pub fn replay(&self) -> Result<Replayed, QueryError> {
+    pub fn repeat(&self) -> Result<RepeatedGeneration, QueryError> {
         let Self { of, checkpoint, .. } = self;
         let restored = Evolution::restore(checkpoint);
         let mut after = restored.map_err(|error| self.other(error.to_string()))?;
         let told = self.told()?;
         let generation = after.ask();
-        after.replay(&told).map_err(|error| self.other(error.to_string()))?;
+        after.repeat(&told).map_err(|error| self.other(error.to_string()))?;
         let found = after.digest().to_string();
         if found != of.digest {
             let what = format!("they have the digest {found}, and the history {}", of.digest);
             return Err(self.other(what));
         }
-        Ok(Replayed { generation, told, after })
+        Ok(RepeatedGeneration { generation, told, after })
     }
 }
 

@@ -15,7 +15,9 @@ use crate::{
     wire,
 };
 
-use super::{QueryError, Reader, StoredGeneration, address, experiment, generation::Replayed};
+use super::{
+    QueryError, Reader, StoredGeneration, address, experiment, generation::RepeatedGeneration,
+};
 
 impl Reader {
     /// The champion of an experiment.
@@ -133,7 +135,7 @@ fn individuals(
     let (genotypes, told, after) = match wanted {
         Wanted::Page(Several { fitness_only: true, .. }) => (None, stored.told()?, None),
         _ => {
-            let Replayed { generation, told, after } = stored.replay()?;
+            let RepeatedGeneration { generation, told, after } = stored.repeat()?;
             (Some(generation.genotypes), told, Some(after))
         }
     };

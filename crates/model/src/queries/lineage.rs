@@ -13,7 +13,9 @@ use crate::{
     store::{LogEntry, Store, StoredExperiment},
 };
 
-use super::{QueryError, Reader, address, experiment, generation::check_in_log};
+use super::{
+    QueryError, Reader, address, config, experiment, generation::check_in_log, other_bits,
+};
 
 impl Reader {
     /// The lineage of an individual.
@@ -63,15 +65,8 @@ impl StoredLineage {
     fn trace(self) -> Result<GetLineageResponse, QueryError> {
         let Self { experiment, individual, checkpoint, first, log } = self;
         let (id, generation) = (experiment.id, first + log.len() as u64 - 1);
-        let other = |what: String| QueryError::OtherBits {
-            experiment: id,
-            generation,
-            what,
-            theirs: experiment.fingerprint.clone(),
-        };
-        let (config, _) =
-            ExperimentConfig::from_json(&experiment.config_json, "", evolution::ALGORITHMS)
-                .map_err(|error| other(error.to_string()))?;
+        let other = |what: String| other_bits(&experiment, generation, what);
+        let config = config(&experiment, generation)?;
         let size = u64::from(config.algorithm.population_size);
         if size * experiment.genotype_len * log.len() as u64 > LINEAGE_GENES_MAX {
             return Err(too_deep());
@@ -96,8 +91,8 @@ impl StoredLineage {
             for (pedigree, births) in pedigrees.iter_mut().zip(births) {
                 pedigree.push(births, &told);
             }
-            let replay = evolution.replay(&told).map_err(|error| other(error.to_string()))?;
-            let found = replay.summary.digest.to_string();
+            let repeated = evolution.repeat(&told).map_err(|error| other(error.to_string()))?;
+            let found = repeated.summary.digest.to_string();
             if found != of.digest {
                 return Err(other(format!("it has the digest {found}, and not {}", of.digest)));
             }

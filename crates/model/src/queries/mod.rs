@@ -8,12 +8,15 @@ mod dynamics;
 mod explanation;
 mod families;
 mod fitness;
+mod front;
 mod generation;
 mod individuals;
 mod lineage;
 mod reader;
 mod repertoire;
 
+use evolution::ALGORITHMS;
+use experiment_file::ExperimentConfig;
 use tonic::Status;
 
 use crate::{
@@ -101,14 +104,32 @@ pub enum QueryError {
         experiment: ExperimentId,
     },
     /// The algorithm evolves no repertoire.
-    #[error(
-        "experiment {experiment} has no repertoire: {algorithm} evolves none; MAP-Elites and DNS do"
-    )]
+    #[error("experiment {experiment} has no repertoire: {algorithm} evolves none; MAP-Elites does")]
     NoRepertoire {
         /// The experiment.
         experiment: ExperimentId,
         /// Its algorithm.
         algorithm: String,
+    },
+    /// The algorithm evolves no front.
+    #[error("experiment {experiment} has no front: {algorithm} evolves none; NSGA-II does")]
+    NoFront {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// Its algorithm.
+        algorithm: String,
+    },
+    /// A reference point has other numbers than the aims.
+    #[error(
+        "the reference point has {found} numbers, but needs {expected} finite ones: for {aims}"
+    )]
+    WrongReference {
+        /// Its length.
+        found: usize,
+        /// Fitness and aims.
+        expected: usize,
+        /// Their names.
+        aims: String,
     },
     /// A cell of a repertoire has no elite.
     #[error(
@@ -152,6 +173,19 @@ pub enum QueryError {
 /// Reads an address from a client; INVALID_ARGUMENT if it is invalid.
 fn address(text: &str) -> Result<Address, Status> {
     text.parse().map_err(|error: NotAnAddress| Status::invalid_argument(error.to_string()))
+}
+
+/// Why stored data of a generation cannot be recomputed here.
+fn other_bits(experiment: &StoredExperiment, generation: u64, what: String) -> QueryError {
+    let theirs = experiment.fingerprint.clone();
+    QueryError::OtherBits { experiment: experiment.id, generation, what, theirs }
+}
+
+/// The file of an experiment, to recompute a generation.
+fn config(experiment: &StoredExperiment, generation: u64) -> Result<ExperimentConfig, QueryError> {
+    ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)
+        .map(|(config, _)| config)
+        .map_err(|error| other_bits(experiment, generation, error.to_string()))
 }
 
 /// Reads one experiment.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use evolution::{ALGORITHMS, EliteReport, Repertoire};
-use experiment_file::{DescriptorConfig, ExperimentConfig, ParameterValue};
+use experiment_file::{AlgorithmDescription, DescriptorConfig, LearnsFrom, ParameterValue};
 use swarm_proto::v1::{
     self, CorrectedFigures, DescriptorAxis, GetRepertoireRequest, GetRepertoireResponse,
 };
@@ -11,7 +11,9 @@ use tonic::Status;
 
 use crate::{Address, Cell, Who, ids::ExperimentId, store::Store};
 
-use super::{QueryError, Reader, StoredGeneration, experiment, generation::Replayed};
+use super::{
+    QueryError, Reader, StoredGeneration, config, experiment, generation::RepeatedGeneration,
+};
 
 impl Reader {
     /// The repertoire of an experiment after a generation.
@@ -41,17 +43,25 @@ fn read(
     id: ExperimentId,
     generation: Option<u64>,
 ) -> Result<StoredGeneration, QueryError> {
+    read_of(store, id, generation, LearnsFrom::Descriptors)?
+        .map_err(|algorithm| QueryError::NoRepertoire { experiment: id, algorithm })
+}
+
+/// A generation of an experiment whose algorithm learns in this way; otherwise the name of its
+/// algorithm.
+pub(super) fn read_of(
+    store: &Store,
+    id: ExperimentId,
+    generation: Option<u64>,
+    learns_from: LearnsFrom,
+) -> Result<Result<StoredGeneration, String>, QueryError> {
     let found = experiment(store, id)?;
-    let is_known = ALGORITHMS.iter().any(|algorithm| {
-        algorithm.name == found.summary.algorithm
-            && algorithm.learns_from == experiment_file::LearnsFrom::Descriptors
-    });
-    if !is_known {
-        let algorithm = found.summary.algorithm.clone();
-        return Err(QueryError::NoRepertoire { experiment: id, algorithm });
+    let algorithm = AlgorithmDescription::find(ALGORITHMS, &found.summary.algorithm);
+    if !algorithm.is_some_and(|algorithm| algorithm.learns_from == learns_from) {
+        return Ok(Err(found.summary.algorithm.clone()));
     }
     let latest = found.n_generations().saturating_sub(1);
-    StoredGeneration::read(store, id, generation.unwrap_or(latest))
+    StoredGeneration::read(store, id, generation.unwrap_or(latest)).map(Ok)
 }
 
 /// Recomputes a repertoire, and passes it to `then`; CPU-bound.
@@ -59,7 +69,7 @@ fn with_repertoire<T>(
     stored: &StoredGeneration,
     then: impl FnOnce(&Repertoire<'_>) -> Result<T, QueryError>,
 ) -> Result<T, QueryError> {
-    let Replayed { told, after, .. } = stored.replay()?;
+    let RepeatedGeneration { told, after, .. } = stored.repeat()?;
     let repertoire = after.elites(&told.end).ok_or_else(|| QueryError::NoRepertoire {
         experiment: stored.experiment.id,
         algorithm: stored.experiment.summary.algorithm.clone(),
@@ -81,8 +91,7 @@ fn elite_of(stored: &StoredGeneration, cell: Cell) -> Result<(u64, u32), QueryEr
 }
 
 fn message(stored: &StoredGeneration) -> Result<GetRepertoireResponse, QueryError> {
-    let (config, _) = ExperimentConfig::from_json(&stored.experiment.config_json, "", ALGORITHMS)
-        .map_err(|error| QueryError::Undecodable(error.to_string()))?;
+    let config = config(&stored.experiment, stored.of.generation)?;
     with_repertoire(stored, |repertoire| {
         let figures = repertoire.figures();
         let shown = if figures.is_some() { repertoire.corrected() } else { repertoire.by_cell() };
@@ -105,14 +114,19 @@ fn message(stored: &StoredGeneration) -> Result<GetRepertoireResponse, QueryErro
 
 fn axis(descriptor: &DescriptorConfig) -> DescriptorAxis {
     let DescriptorConfig { measure, summarises, range: [low, high], cells } = descriptor;
-    let of = match ParameterValue::from(*summarises) {
-        ParameterValue::Name(name) => name,
-        _ => String::new(),
-    };
+    let of = name_of(*summarises);
     DescriptorAxis { measure: measure.clone(), of, low: *low, high: *high, cells: *cells }
 }
 
-fn elite(elite: &EliteReport<'_>) -> v1::Elite {
+/// The name of a value in files.
+pub(super) fn name_of(value: impl Into<ParameterValue>) -> String {
+    match value.into() {
+        ParameterValue::Name(name) => name,
+        _ => String::new(),
+    }
+}
+
+pub(super) fn elite(elite: &EliteReport<'_>) -> v1::Elite {
     v1::Elite {
         generation: elite.generation,
         individual: elite.individual,

@@ -86,5 +86,3 @@ fn inspect_file(path: &Path, restore: &str) -> Result<Inspection> {
 
 #[cfg(test)]
 pub mod tests;
-#[cfg(test)]
-mod verdicts;

@@ -1,5 +1,7 @@
 //! Databases with damage of every kind, and the results of inspection and recovery.
 
+mod verdicts;
+
 use std::fs;
 
 use evolution::{Checkpoint, Evolution, Told};

@@ -5,14 +5,13 @@ use std::{fs, path::Path};
 use evolution::{Champion, ChampionSource, HeldOut, Judged, Real};
 use rusqlite::Connection;
 
-use super::{
-    super::{ForkRecord, NewExperiment, StoreError, file, schema, tests::new_experiment},
-    tests::{advance, data_directory, edit, findings},
-    *,
-};
+use super::{advance, data_directory, edit, findings};
 use crate::{
     restored::restore_evolution,
-    store::{Filter, Store},
+    store::{
+        Filter, ForkRecord, NewExperiment, Store, StoreError, file, inspection::*, schema,
+        tests::new_experiment,
+    },
 };
 
 /// The unfinished experiment with generations.
@@ -129,10 +128,10 @@ fn a_champion_whose_interval_older_versions_could_not_compute_is_read() {
         held_out: Some(HeldOut { mean: one, ci95: one, n_trials: 2, generation: 0 }),
         judged: Some(Judged { mean: one, low: one, high: one, n_trials: 2, generation: 0 }),
     };
-    let sealer = super::super::seals::Sealer::from_database(store.connection()).unwrap();
+    let sealer = crate::store::seals::Sealer::from_database(store.connection()).unwrap();
     for nan in [f64::NAN, -f64::NAN] {
         let transaction = store.connection().unchecked_transaction().unwrap();
-        super::super::champions::put(&transaction, &sealer, id, &champion, None, "").unwrap();
+        crate::store::champions::put(&transaction, &sealer, id, &champion, None, "").unwrap();
         // Makes the seal as an older version did, which stored NaN as NULL.
         let seal = sealer
             .begin("champion", id)
@@ -181,9 +180,9 @@ fn a_list_that_could_not_be_read_again_is_not_stored() {
         held_out: None,
         judged: None,
     };
-    let sealer = super::super::seals::Sealer::from_database(store.connection()).unwrap();
+    let sealer = crate::store::seals::Sealer::from_database(store.connection()).unwrap();
     let transaction = store.connection().unchecked_transaction().unwrap();
-    let put = super::super::champions::put(&transaction, &sealer, RUNNING, &champion, None, "");
+    let put = crate::store::champions::put(&transaction, &sealer, RUNNING, &champion, None, "");
     assert!(put.unwrap_err().to_string().contains("not finite"));
 }
 
