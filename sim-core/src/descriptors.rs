@@ -1,8 +1,8 @@
-//! The descriptors of an experiment, by the places of their measures.
+//! The descriptors of an experiment, or the values of its aims, by the places of their measures.
 
 use crate::problems::Problems;
 use crate::record::MeasureName;
-use experiment_file::{DescriptorConfig, Summarises, suggestion};
+use experiment_file::{LearntMeasure, Summarises, suggestion};
 
 /// A descriptor of a trial.
 #[derive(Debug, Clone)]
@@ -15,21 +15,20 @@ pub(crate) struct Descriptor {
 
 /// Finds the measures of descriptors. `names`: those of the task.
 pub(crate) fn compile(
-    descriptors: &[DescriptorConfig],
+    descriptors: Vec<LearntMeasure<'_>>,
     names: &[MeasureName],
     problems: &mut Problems,
 ) -> Vec<Descriptor> {
     let mut compiled = Vec::new();
-    for (i, descriptor) in descriptors.iter().enumerate() {
-        let DescriptorConfig { measure, summarises, .. } = descriptor;
-        match names.iter().find(|name| *name == measure) {
+    for LearntMeasure { path, measure, summarises } in descriptors {
+        match names.iter().find(|name| name.as_ref() == measure) {
             Some(name) => {
-                compiled.push(Descriptor { measure: name.clone(), summarises: *summarises });
+                compiled.push(Descriptor { measure: name.clone(), summarises });
             }
             None => {
                 let known: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
                 problems.add(
-                    format!("algorithm.descriptors[{i}].measure"),
+                    path,
                     match known[..] {
                         [] => format!(
                             "the task has no measures, so none is named `{measure}`; a function \

@@ -27,33 +27,38 @@ pub(crate) struct Exp2<V> {
 /// 2^y in parts, from which other functions than 2^y can be computed without loss.
 #[inline(always)]
 pub(crate) fn exp2_parts<S: Simd>(simd: S, y: S::f32s) -> Exp2<S::f32s> {
-    let Exp2 { s: [s], q: [q], f: [f] } = exp2_parts_of(simd, &[y]);
+    let Exp2 { s: [[s]], q: [[q]], f: [[f]] } = exp2_parts_of(simd, &[[y]]);
     Exp2 { s, q, f }
 }
 
-/// [`exp2_parts`] of several vectors in step: while a processor without a fused multiply-add waits
-/// for one polynomial, it computes the others.
+/// [`exp2_parts`] of several vectors in step: while a processor waits for one polynomial, it
+/// computes the others.
 #[inline(always)]
-pub(crate) fn exp2_parts_of<S: Simd, const W: usize>(
+pub(crate) fn exp2_parts_of<S: Simd, const W: usize, const N: usize>(
     simd: S,
-    y: &[S::f32s; W],
-) -> Exp2<[S::f32s; W]> {
+    y: &[[S::f32s; W]; N],
+) -> Exp2<[[S::f32s; W]; N]> {
     let round = simd.splat_f32s(ROUND);
     let last = simd.splat_f32s(COEFFICIENTS[COEFFICIENTS.len() - 1]);
-    let mut parts = Exp2 { s: *y, q: [last; W], f: *y };
-    for vector in 0..W {
-        let y = simd.min_f32s(y[vector], simd.splat_f32s(MAX_EXPONENT));
-        let y = simd.max_f32s(y, simd.splat_f32s(-MAX_EXPONENT));
-        let rounded = simd.add_f32s(y, round);
-        parts.f[vector] = simd.sub_f32s(y, simd.sub_f32s(rounded, round));
-        let exponent = simd.transmute_u32s_f32s(rounded);
-        let s = simd.wrapping_dyn_shl_u32s(exponent, simd.splat_u32s(SIGNIFICAND_BITS));
-        parts.s[vector] = simd.transmute_f32s_u32s(s);
+    let mut parts = Exp2 { s: *y, q: [[last; W]; N], f: *y };
+    for row in 0..N {
+        for vector in 0..W {
+            let y = simd.min_f32s(y[row][vector], simd.splat_f32s(MAX_EXPONENT));
+            let y = simd.max_f32s(y, simd.splat_f32s(-MAX_EXPONENT));
+            let rounded = simd.add_f32s(y, round);
+            parts.f[row][vector] = simd.sub_f32s(y, simd.sub_f32s(rounded, round));
+            let exponent = simd.transmute_u32s_f32s(rounded);
+            let s = simd.wrapping_dyn_shl_u32s(exponent, simd.splat_u32s(SIGNIFICAND_BITS));
+            parts.s[row][vector] = simd.transmute_f32s_u32s(s);
+        }
     }
     for power in (0..COEFFICIENTS.len() - 1).rev() {
         let coefficient = simd.splat_f32s(COEFFICIENTS[power]);
-        for vector in 0..W {
-            parts.q[vector] = simd.mul_add_f32s(parts.q[vector], parts.f[vector], coefficient);
+        for row in 0..N {
+            for vector in 0..W {
+                let (q, f) = (parts.q[row][vector], parts.f[row][vector]);
+                parts.q[row][vector] = simd.mul_add_f32s(q, f, coefficient);
+            }
         }
     }
     parts

@@ -62,13 +62,15 @@
 //!
 //! [`Simulation::compile`] turns a configuration into a `network`, a codec of genotypes
 //! (`genotype`) and a `world` of `objects`. `episode` steps the trials of a genotype side by side
-//! and shows them to a recorder. In `stepping`, the caller decides the robots' actions. `trial` has
-//! the phases of a step, and `swarm` the state of the robots. Each phase is a module: `senses` and
-//! `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`, `fitness`. All
-//! modules use `determinism`'s random streams, `torus`, `neighbours` (robots within reach of each
-//! other), and the arithmetic on vectors of robots: `lanes` has the vectors, `exp2` the base of
-//! activation functions. [`blueprint`] gives a controller away as numbers, and `testimony` what each
-//! robot perceived and did, so that other programs can prove to do the same. `bench` opens the kernel to the benchmarks.
+//! and shows them to a recorder. In `stepping`, the caller decides the robots' actions, and
+//! `intervention` has what a watcher may change in the middle. `trial` has the phases of a step,
+//! and `swarm` the state of the robots. Each phase is a module: `senses` and `sensors`,
+//! `communication`, `controllers`, `perturbations`, `drive`, `lights`, `fitness`. All modules use
+//! `determinism`'s random streams, `torus`, `neighbours` (robots within reach of each other), and
+//! the arithmetic on vectors of robots: `lanes` has the vectors, `exp2` the base of activation
+//! functions. [`blueprint`] exports a controller as numbers, and `testimony` what each robot
+//! perceived and did, so that other programs can prove to do the same. `bench` opens the kernel to
+//! the benchmarks.
 
 mod alpha_shape;
 #[doc(hidden)]
@@ -85,6 +87,7 @@ mod exp2;
 mod fitness;
 mod genotype;
 mod initializers;
+mod intervention;
 mod lanes;
 mod leadership;
 mod lights;
@@ -113,13 +116,14 @@ mod world;
 
 pub use communication::Mode;
 pub use determinism::{Isa, UnknownIsa, random::TrialSet};
+pub use intervention::{Act, INTERVENTIONS_MAX, Intervention, InterventionError, Thing};
 pub use output::Output;
 pub use record::{
     EpisodeSummary, MeasureName, Measures, MovableRecord, Outline, ReceivedFrame, RobotRecord,
     RoomRecord, StepRecord,
 };
 pub use simulation::{EvaluateError, Simulation};
-pub use specified::{SpecifiedSimulation, panic_to_failure};
+pub use specified::{SpecifiedSimulation, panic_message, panic_to_failure};
 pub use starts::{TRYING_TIME_MAX, Tried};
 pub use stepping::{Actions, Policy, StepError, Stepper};
 pub use testimony::{Frame, HeardFrame, RadioTestimony, Testimony};

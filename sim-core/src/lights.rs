@@ -71,6 +71,19 @@ impl LightPath {
         Self { stream, motion }
     }
 
+    /// Stays where it is from now on.
+    pub fn stop(&mut self) {
+        self.motion = Motion::Static;
+    }
+
+    /// Goes on from a place to which somebody has put the light.
+    pub fn go_on_from(&mut self, position: Vec2, torus: &Torus) {
+        if let Motion::Orbit { angle, radius, .. } = &mut self.motion {
+            let away = torus.displacement(torus.center(), position);
+            (*angle, *radius) = (away.angle(), away.norm());
+        }
+    }
+
     /// The next position after environment step `step`, with robots at `robots`.
     pub fn advance(&mut self, position: Vec2, step: u32, torus: &Torus, robots: &[Vec2]) -> Vec2 {
         match &mut self.motion {

@@ -111,8 +111,8 @@ pub struct RobotRecord {
     pub received: Option<ReceivedFrame>,
     /// The message of that frame; zeros without a frame.
     pub received_message: Vec<f64>,
-    /// Actions of the right and left wheel, in \[-1, 1\]: what the wheels are told, whatever they do
-    /// in a pseudo-reality.
+    /// Actions of the right and left wheel, in \[-1, 1\]: what the wheels are told, whatever they
+    /// do in a pseudo-reality.
     pub wheels: [f64; 2],
     /// Colour of its LED, 0 off.
     pub led: u32,

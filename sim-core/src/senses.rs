@@ -8,7 +8,8 @@ use crate::sensors::{MountedSensor, Noise, NoiseStream, Sensor, Surroundings};
 use crate::swarm::Swarm;
 use crate::torus::Vec2;
 use crate::world::RobotGroup;
-use determinism::random::{Purpose, Stream, standard_normal_quantiles};
+use determinism::normal::standard_normal_quantiles;
+use determinism::random::{Purpose, Stream};
 use experiment_file::SensorQuery;
 
 /// Readings of the robots of one group in one trial, except those of the radio.

@@ -4,9 +4,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::descriptors::{self, Descriptor};
-use crate::episode::{self, AllMeasures, Described, FitnessOnly, Viewer};
+use crate::episode::{self, AllMeasures, Described, FitnessOnly, Recorder, Viewer};
 use crate::fitness::{self, Definition};
 use crate::genotype::Codec;
+use crate::intervention::{self, Intervention, InterventionError};
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 #[cfg(doc)]
@@ -38,6 +39,8 @@ pub struct Simulation {
     pub(crate) network: Network,
     codec: Codec,
     pub(crate) world: World,
+    /// In the order of their steps; none in evolution.
+    pub(crate) interventions: Vec<Intervention>,
 }
 
 /// Why a genotype could not be evaluated.
@@ -80,6 +83,21 @@ pub enum EvaluateError {
         trial_set: TrialSet,
         /// The trial.
         trial: u32,
+    },
+    /// An intervention puts a body where it has no room.
+    #[error(
+        "{kind} {number} has no room at ({}, {}) in step {step}; put it where nothing else is",
+        place[0], place[1]
+    )]
+    NoRoom {
+        /// The kind of the thing.
+        kind: &'static str,
+        /// Its number.
+        number: usize,
+        /// The environment step, from 0.
+        step: u32,
+        /// The place, cm.
+        place: [f64; 2],
     },
     /// The script of the experiment's task failed.
     #[error("{error} (in step {step} of {trial_set}, trial {trial})")]
@@ -125,7 +143,7 @@ impl Simulation {
         let measure_names = measure_names(fitness, script.as_ref());
         // The measures of a script that does not compile are unknown.
         let is_known = config.task.is_none() || script.is_some();
-        let wanted = if is_known { &algorithm.descriptors[..] } else { &[] };
+        let wanted = if is_known { algorithm.learnt_measures().collect() } else { Vec::new() };
         let descriptors = descriptors::compile(wanted, &measure_names, &mut problems);
         problems.check()?;
         let simulation = Self {
@@ -141,6 +159,7 @@ impl Simulation {
             network,
             codec,
             world: world.expect("a world without problems compiles"),
+            interventions: Vec::new(),
         };
         let mut problems = Problems::default();
         for trial in 0..simulation.n_trials.min(N_TRIED_TRIALS) {
@@ -161,6 +180,19 @@ impl Simulation {
     #[must_use]
     pub fn with_isa(self, isa: Isa) -> Self {
         Self { isa, ..self }
+    }
+
+    /// The same experiment, in each of whose episodes somebody intervenes.
+    ///
+    /// # Errors
+    ///
+    /// All interventions that do not fit the world or the length of the episodes.
+    pub fn with_interventions(
+        self,
+        interventions: Vec<Intervention>,
+    ) -> Result<Self, InterventionError> {
+        let interventions = intervention::in_order(interventions, &self.world, self.n_steps)?;
+        Ok(Self { interventions, ..self })
     }
 
     /// Number d of genes of a genotype.
@@ -213,11 +245,8 @@ impl Simulation {
         trials: Range<u32>,
         keep_going: &dyn Fn() -> bool,
     ) -> Result<Option<Vec<f64>>, EvaluateError> {
-        let phenotype = self.phenotype(genotype)?;
-        self.check_trials(&trials)?;
         let mut recorder = FitnessOnly::default();
-        let done =
-            episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
+        let done = self.run(genotype, trial_set.into(), trials, keep_going, &mut recorder)?;
         Ok(done.then_some(recorder.fitness))
     }
 
@@ -238,8 +267,9 @@ impl Simulation {
 
     /// As [`evaluate_while`](Self::evaluate_while), but also measures every step. Returns
     /// [`values_per_trial`](Self::values_per_trial) numbers for each trial, one trial after the
-    /// other. The first number is the fitness, bit for bit. The others are, step by step, the values
-    /// of the measures in [`measure_names`](Self::measure_names), NaN where a measure has none.
+    /// other. The first number is the fitness, bit for bit. The others are, step by step, the
+    /// values of the measures in [`measure_names`](Self::measure_names), NaN where a measure has
+    /// none.
     ///
     /// # Errors
     ///
@@ -251,11 +281,8 @@ impl Simulation {
         trials: Range<u32>,
         keep_going: &dyn Fn() -> bool,
     ) -> Result<Option<Vec<f64>>, EvaluateError> {
-        let phenotype = self.phenotype(genotype)?;
-        self.check_trials(&trials)?;
         let mut recorder = AllMeasures::new(self, trials.len());
-        let done =
-            episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
+        let done = self.run(genotype, trial_set.into(), trials, keep_going, &mut recorder)?;
         Ok(done.then_some(recorder.values))
     }
 
@@ -278,11 +305,8 @@ impl Simulation {
         trials: Range<u32>,
         keep_going: &dyn Fn() -> bool,
     ) -> Result<Option<Vec<f64>>, EvaluateError> {
-        let phenotype = self.phenotype(genotype)?;
-        self.check_trials(&trials)?;
         let mut recorder = Described::new(self, trials.len());
-        let done =
-            episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
+        let done = self.run(genotype, trial_set.into(), trials, keep_going, &mut recorder)?;
         Ok(done.then_some(recorder.values))
     }
 
@@ -318,13 +342,24 @@ impl Simulation {
         keep_going: &dyn Fn() -> bool,
         observe: &mut dyn FnMut(&StepRecord),
     ) -> Result<Option<EpisodeSummary>, EvaluateError> {
-        let phenotype = self.phenotype(genotype)?;
         let trials = trial..trial.saturating_add(1);
-        self.check_trials(&trials)?;
         let mut recorder = Viewer::new(observe);
-        let done =
-            episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
+        let done = self.run(genotype, trial_set.into(), trials, keep_going, &mut recorder)?;
         Ok(done.then(|| recorder.summary()))
+    }
+
+    /// Simulates trials, and shows them to a recorder. Returns false if `keep_going` stopped it.
+    fn run<R: Recorder>(
+        &self,
+        genotype: &[f64],
+        trial_set: TrialSet,
+        trials: Range<u32>,
+        keep_going: &dyn Fn() -> bool,
+        recorder: &mut R,
+    ) -> Result<bool, EvaluateError> {
+        let phenotype = self.phenotype(genotype)?;
+        self.check_trials(&trials)?;
+        episode::run(self, &phenotype, trial_set, trials, keep_going, recorder)
     }
 
     /// The room of a trial: boundary, walls, obstacles, and the outlines of movables and robots;

@@ -47,8 +47,8 @@ impl SpecifiedSimulation {
     }
 
     /// Computes the trials of one genotype with [`Simulation::evaluate_while`],
-    /// [`Simulation::measure_while`] or [`Simulation::describe_while`], depending on `output`. `None`
-    /// if `keep_going` stopped it.
+    /// [`Simulation::measure_while`] or [`Simulation::describe_while`], depending on `output`.
+    /// `None` if `keep_going` stopped it.
     ///
     /// # Errors
     ///
@@ -83,7 +83,8 @@ pub fn panic_to_failure<T>(computation: impl FnOnce() -> Result<T, String>) -> R
         .unwrap_or_else(|payload| Err(format!("panicked: {}", panic_message(&*payload))))
 }
 
-fn panic_message(payload: &(dyn Any + Send)) -> &str {
+/// The message of a caught panic.
+pub fn panic_message(payload: &(dyn Any + Send)) -> &str {
     payload
         .downcast_ref::<&str>()
         .copied()

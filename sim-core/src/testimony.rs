@@ -102,8 +102,9 @@ impl Simulation {
     }
 
     /// Simulates the episode of one trial, and shows what each robot of the evolvable object
-    /// perceived and did, step by step and robot by robot, until the observer breaks off. The episode has the same bits as in
-    /// [`simulate`](Self::simulate); a decision is the network's own, before any perturbation.
+    /// perceived and did, step by step and robot by robot, until the observer breaks off. The
+    /// episode has the same bits as in [`simulate`](Self::simulate); a decision is the network's
+    /// own, before any perturbation.
     ///
     /// # Errors
     ///

@@ -3,7 +3,9 @@
 mod address;
 mod interior;
 mod realities;
+mod record;
 mod starts;
+mod watched;
 mod witness;
 
 use std::{mem, ops::Range};
@@ -16,7 +18,6 @@ use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
 use crate::objects::Switches;
 use crate::perturbations::Perturbations;
-use crate::record::{Measures, RobotRecord, StepRecord};
 use crate::script::{May, ScriptRun, View};
 use crate::senses::Senses;
 use crate::sensors::Surroundings;
@@ -35,6 +36,7 @@ pub(crate) use self::interior::Interior;
 use self::realities::Realities;
 use self::starts::Starts;
 pub(crate) use self::starts::{room, try_places};
+use self::watched::Watched;
 
 /// State of a trial.
 pub(crate) struct Trial<'a> {
@@ -56,6 +58,8 @@ pub(crate) struct Trial<'a> {
     groups: Vec<Group>,
     /// `None` without pseudo-reality.
     realities: Option<Realities>,
+    /// `None` without interventions.
+    watched: Option<Watched<'a>>,
     /// Streams for stochastic decoding, per robot.
     decoding: Vec<Stream>,
     /// `None`: the script computes the fitness.
@@ -164,6 +168,7 @@ impl<'a> Trial<'a> {
             areas,
             groups,
             realities,
+            watched: Watched::new(&simulation.interventions, world),
             decoding: address.streams(Purpose::Decoding, n_robots),
             fitness: simulation
                 .fitness
@@ -188,6 +193,7 @@ impl<'a> Trial<'a> {
     /// Start of a step: every robot senses at its present position and heading, and hears the
     /// frames on the air. The script plans the actions of its robots.
     pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
+        self.intervene(step)?;
         let mut moved = mem::replace(&mut self.swarm.moved, false);
         let turned = mem::replace(&mut self.swarm.turned, false);
         // A switch of the topology moves robots elsewhere.
@@ -204,6 +210,9 @@ impl<'a> Trial<'a> {
         // turns.
         if moved {
             self.neighbours.update(&self.world.torus, &self.swarm.positions);
+            if let Some(watched) = &self.watched {
+                watched.retain_present(&mut self.neighbours);
+            }
         }
         if let (true, Some(audible), Some(interior)) = (moved, &mut self.audible, &self.interior) {
             audible.clone_from(&self.neighbours);
@@ -219,6 +228,9 @@ impl<'a> Trial<'a> {
         self.radio.receive(audible, &mut self.swarm);
         if let Some(realities) = &mut self.realities {
             realities.receive(&mut self.swarm);
+        }
+        if let Some(watched) = &self.watched {
+            watched.deafen(&mut self.swarm);
         }
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
             let surroundings = Surroundings {
@@ -320,6 +332,9 @@ impl<'a> Trial<'a> {
             state.perturbations.rewrite(step, group, &mut self.swarm);
         }
         self.swarm.stop_failed();
+        if let Some(watched) = &self.watched {
+            watched.stop(&mut self.swarm);
+        }
         // Wheels turn, in a pseudo-reality otherwise than they are told.
         if let Some(realities) = &mut self.realities {
             realities.turn_wheels(&mut self.swarm.wheels);
@@ -348,10 +363,8 @@ impl<'a> Trial<'a> {
 
     /// The script changes robots, lights and areas after the actions.
     fn react(&mut self, step: u32) -> Result<(), EvaluateError> {
-        if self.run_script(step, ScriptRun::react)?.is_some() && self.radio.mute(&self.swarm.failed)
-        {
-            // Now other robots are the loudest, so hearing changes.
-            self.swarm.turned = true;
+        if self.run_script(step, ScriptRun::react)?.is_some() {
+            self.silence(std::iter::empty());
         }
         Ok(())
     }
@@ -360,7 +373,11 @@ impl<'a> Trial<'a> {
     pub fn silence(&mut self, robots: impl Iterator<Item = usize>) {
         let mut silent = self.swarm.failed.clone();
         robots.for_each(|robot| silent[robot] = true);
-        if self.radio.mute(&silent) {
+        self.mute(&silent);
+    }
+
+    fn mute(&mut self, silent: &[bool]) {
+        if self.radio.mute(silent) {
             // Now other robots are the loudest, so hearing changes.
             self.swarm.turned = true;
         }
@@ -406,51 +423,6 @@ impl<'a> Trial<'a> {
         for (position, path) in self.lights.iter_mut().zip(&mut self.light_paths) {
             *position = path.advance(*position, step, &self.world.torus, &self.swarm.positions);
         }
-        Ok(())
-    }
-
-    /// Fills in the measures of the last scored step.
-    pub fn measure(&mut self, step: u32, measures: &mut Measures) -> Result<(), EvaluateError> {
-        measures.clear();
-        if let Some(fitness) = &self.fitness {
-            let moment = Moment::new(self.world, &self.swarm, &self.lights, step);
-            fitness.measure(&moment, measures);
-        }
-        self.run_script(step, |script, view| script.measure(view, measures))?;
-        Ok(())
-    }
-
-    /// Fills in the last scored step, without the data of controllers.
-    pub fn record(
-        &mut self,
-        step: u32,
-        fitness: Option<f64>,
-        record: &mut StepRecord,
-    ) -> Result<(), EvaluateError> {
-        let StepRecord {
-            step: number,
-            fitness: of_step,
-            measures,
-            robots,
-            lights,
-            areas,
-            movables,
-        } = record;
-        (*number, *of_step) = (step, fitness);
-        self.measure(step, measures)?;
-        robots.resize_with(self.world.n_robots(), RobotRecord::default);
-        for (robot, record) in robots.iter_mut().enumerate() {
-            self.swarm.record(robot, record);
-        }
-        let targets = self.fitness.as_ref().map_or(&[][..], |fitness| fitness.targets());
-        for (robot, target) in self.world.evaluated().zip(targets) {
-            robots[robot].target = Some(*target);
-        }
-        if let Some(interior) = &self.interior {
-            interior.record(robots, movables);
-        }
-        lights.clone_from(&self.lights);
-        areas.clone_from(&self.areas);
         Ok(())
     }
 

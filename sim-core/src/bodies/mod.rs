@@ -93,6 +93,8 @@ struct Body {
     traction: Traction,
     /// Speed and turning that the wheels ask for.
     asked: (f64, f64),
+    /// Whether it has not been removed.
+    is_present: bool,
 }
 
 impl Body {
@@ -231,6 +233,7 @@ impl Bodies {
             inverse_inertia: 1.0 / inertia,
             traction,
             asked: (0.0, 0.0),
+            is_present: true,
         });
     }
 
@@ -295,17 +298,26 @@ impl Bodies {
         self.fixtures.len()
     }
 
-    /// Puts a load at rest elsewhere if it would overlap nothing there; returns whether it did.
-    fn put(&mut self, load: usize, pose: Pose) -> bool {
-        if !self.is_free_beside(&self.bodies[load].shape, pose, Some(load)) {
+    /// Puts a body at rest elsewhere if it would overlap nothing there; returns whether it did.
+    fn put(&mut self, number: usize, pose: Pose) -> bool {
+        if !self.is_free_beside(&self.bodies[number].shape, pose, Some(number)) {
             return false;
         }
-        let body = &mut self.bodies[load];
+        let body = &mut self.bodies[number];
         (body.position, body.heading) = (pose.position, pose.heading);
         body.axis = Vec2::unit(pose.heading);
         (body.velocity, body.turning) = (Vec2::default(), 0.0);
-        self.bumps.retain(|bump| bump.body != Some(load));
+        self.bumps.retain(|bump| bump.robot != number && bump.body != Some(number));
         true
+    }
+
+    /// Takes a robot out of the room for good: it meets nothing, and nothing meets it.
+    pub fn remove(&mut self, robot: usize) {
+        let body = &mut self.bodies[robot];
+        body.is_present = false;
+        (body.velocity, body.turning) = (Vec2::default(), 0.0);
+        self.by_left_end.retain(|&other| other != robot);
+        self.bumps.retain(|bump| bump.robot != robot && bump.body != Some(robot));
     }
 
     /// Whether a body of this shape would overlap nothing at this pose.
@@ -322,7 +334,7 @@ impl Bodies {
             solver::meet(placed, fixture, 0.0, &mut meet);
         }
         for (number, body) in self.bodies.iter().enumerate() {
-            if Some(number) != itself {
+            if Some(number) != itself && body.is_present {
                 collision::between(placed, body.placed(), 0.0, &mut meet);
             }
         }

@@ -54,7 +54,8 @@ impl Bodies {
         let is_past_fixtures =
             || !self.fixtures.iter().any(|fixture| ray.until_fixture(fixture).is_some());
         let is_past_movers = || {
-            let mut movers = (0..self.bodies.len()).filter(|body| !ends.contains(body));
+            let is_between = |body: &usize| self.bodies[*body].is_present && !ends.contains(body);
+            let mut movers = (0..self.bodies.len()).filter(is_between);
             !movers.any(|body| self.meets(&ray, body).is_some())
         };
         match blocked_by {

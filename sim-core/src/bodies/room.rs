@@ -217,17 +217,15 @@ impl Room {
         contains(&self.outline, place) && !obstacles.iter().any(|obstacle| obstacle.contains(place))
     }
 
-    /// Puts a movable at rest elsewhere, if it is in the room there and overlaps nothing; returns
+    /// Number of all movables.
+    pub fn n_movables(&self) -> usize {
+        self.movables.last().map_or(0, |things| things.members.end)
+    }
+
+    /// Puts a body at rest elsewhere, if it is in the room there and overlaps nothing; returns
     /// whether it did.
-    pub fn put(
-        &self,
-        bodies: &mut Bodies,
-        obstacles: &[Outline],
-        movable: usize,
-        pose: Pose,
-    ) -> bool {
-        let load = bodies.loads().start + movable;
-        self.has_ground_at(pose.position, obstacles) && bodies.put(load, pose)
+    pub fn put(&self, bodies: &mut Bodies, obstacles: &[Outline], body: usize, pose: Pose) -> bool {
+        self.has_ground_at(pose.position, obstacles) && bodies.put(body, pose)
     }
 
     /// Draws where everything starts: obstacles, then movables, then robots, each where it

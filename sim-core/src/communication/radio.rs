@@ -66,6 +66,11 @@ impl Radio {
         self.hearing.update(neighbours, swarm.antennas());
     }
 
+    /// Whether each robot is muted.
+    pub fn silent(&self) -> &[bool] {
+        &self.silent
+    }
+
     /// Mutes robots that have failed or are silent. Returns whether the set of muted robots has
     /// changed.
     pub fn mute(&mut self, silent: &[bool]) -> bool {

@@ -94,7 +94,8 @@ impl<'a> View<'a> {
             return Ok(false);
         };
         meter.work(PLACING * bodies.n_things())?;
-        let is_free = room.put(bodies, obstacles, number, pose);
+        let load = bodies.loads().start + number;
+        let is_free = room.put(bodies, obstacles, load, pose);
         self.swarm.moved |= is_free;
         Ok(is_free)
     }

@@ -3,7 +3,8 @@
 use super::*;
 use crate::testing::{experiment_a, genotype, robot};
 use experiment_file::{
-    DescriptorConfig, GenotypeQuery, ScriptConfig, Summarises, SynapseSelector, TaskConfig,
+    AimConfig, DescriptorConfig, Direction, GenotypeQuery, ScriptConfig, Summarises,
+    SynapseSelector, TaskConfig,
 };
 
 #[test]
@@ -224,4 +225,24 @@ fn a_descriptor_of_an_unknown_measure_is_refused_with_the_known_ones() {
         refused,
         "algorithm.descriptors[1].measure: the task has no measure `leader`; did you mean `leaders`?"
     );
+}
+
+#[test]
+fn the_values_of_aims_are_those_of_descriptors_of_the_same_measures() {
+    let mut config = described();
+    let expected = Simulation::compile(&config).unwrap();
+    let descriptors = std::mem::take(&mut config.algorithm.descriptors);
+    let aim = |descriptor: DescriptorConfig| AimConfig {
+        measure: descriptor.measure,
+        summarises: descriptor.summarises,
+        direction: Direction::Minimise,
+    };
+    config.algorithm.aims = descriptors.into_iter().map(aim).collect();
+    let simulation = Simulation::compile(&config).unwrap();
+    let genotype = genotype(simulation.genotype_len(), 2);
+    let describe = |of: &Simulation| of.describe_while(&genotype, 5, 0..3, &|| true);
+    assert_eq!(describe(&simulation), describe(&expected));
+    config.algorithm.aims[2].measure = "later".to_owned();
+    let refused = Simulation::compile(&config).unwrap_err().to_string();
+    assert!(refused.starts_with("algorithm.aims[2].measure: the task has no measure `later`"));
 }

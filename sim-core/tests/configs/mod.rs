@@ -254,6 +254,7 @@ fn topology(stimuli: &[(&str, u32, SensorQuery)], motor: Motor) -> TopologyConfi
 fn algorithm(fitness_function: FitnessFunction, evaluation_steps: u32) -> AlgorithmConfig {
     AlgorithmConfig {
         descriptors: Vec::new(),
+        aims: Vec::new(),
         name: "SNES".into(),
         evolvable_object: "robotA".into(),
         population_size: 100,

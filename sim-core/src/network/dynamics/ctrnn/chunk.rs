@@ -12,8 +12,12 @@ use crate::lanes::Lanes;
 use determinism::Isa;
 use experiment_file::InitialRates;
 
-/// Vectors per row of a chunk, at most: the sums of four neurons then fit in registers.
-pub(super) const MAX_WIDTH: usize = 4;
+/// Vectors per row of a chunk, at most.
+pub(super) const MAX_WIDTH: usize = 6;
+/// Vectors per row, at most, for which four neurons at a time are faster than one: one neuron has
+/// too few sums to keep the processor busy. Sixteen registers hold four sums of two vectors; with
+/// more, a sum lives in memory, and every synapse waits for it.
+const MAX_NARROW: usize = 3;
 
 /// The state of a network in some neighbouring vectors of lanes.
 #[derive(Debug)]
@@ -67,6 +71,8 @@ impl Chunk {
             2 => isa.run(Work::<2> { kernel, chunk: self, task }),
             3 => isa.run(Work::<3> { kernel, chunk: self, task }),
             4 => isa.run(Work::<4> { kernel, chunk: self, task }),
+            5 => isa.run(Work::<5> { kernel, chunk: self, task }),
+            6 => isa.run(Work::<6> { kernel, chunk: self, task }),
             width => unreachable!("{width} vectors are more than MAX_WIDTH"),
         }
     }
@@ -98,7 +104,11 @@ impl<const W: usize> WithSimd for Work<'_, W> {
             Task::Advance(stimuli) => {
                 perceive::<S, W>(simd, kernel, chunk, stimuli);
                 for _ in 0..kernel.n_substeps {
-                    integrate::<S, W>(simd, kernel, chunk);
+                    if W > MAX_NARROW {
+                        integrate_wide::<S, W>(simd, kernel, chunk);
+                    } else {
+                        integrate::<S, W>(simd, kernel, chunk);
+                    }
                     mem::swap(&mut chunk.activity, &mut chunk.scratch);
                 }
             }
@@ -185,6 +195,33 @@ fn integrate_blocks<S: Simd, const W: usize, const N: usize>(
             }
         }
         squash(simd, block.activation, y, u);
+    }
+}
+
+/// [`integrate`] for wide rows, neuron by neuron. It multiplies no zeros, and needs few registers:
+/// the activities are operands in memory.
+#[inline(always)]
+fn integrate_wide<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk) {
+    let before = rows::<S, W>(chunk.activity.values());
+    let after = rows_mut::<S, W>(chunk.scratch.values_mut()).as_chunks_mut::<2>().0;
+    let states = rows_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<2>().0;
+    let drives = rows::<S, W>(chunk.drive.values()).as_chunks::<2>().0;
+    let pairs = kernel.rows.as_chunks::<2>().0.iter();
+    for (((pair, y), u), drive) in pairs.zip(states).zip(after).zip(drives) {
+        for (row, (y, drive)) in pair.iter().zip(y.iter_mut().zip(drive)) {
+            let mut sums = *drive;
+            for synapse in &kernel.synapses[row.synapses.clone()] {
+                let weight = simd.splat_f32s(synapse.weight);
+                for (sum, u) in sums.iter_mut().zip(&before[synapse.pre as usize]) {
+                    *sum = simd.mul_add_f32s(weight, *u, *sum);
+                }
+            }
+            let retention = simd.splat_f32s(row.retention);
+            for (y, sum) in y.iter_mut().zip(sums) {
+                *y = simd.mul_add_f32s(retention, *y, sum);
+            }
+        }
+        squash(simd, pair[0].activation, y, u);
     }
 }
 

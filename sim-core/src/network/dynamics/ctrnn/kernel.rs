@@ -16,6 +16,10 @@ pub(super) struct Kernel {
     pub initial_rates: InitialRates,
     pub quads: Blocks<4>,
     pub pairs: Blocks<2>,
+    /// The same neurons one by one.
+    pub rows: Vec<Row>,
+    /// The synapses of `rows`, row by row.
+    pub synapses: Vec<Synapse>,
 }
 
 /// Blocks of N neurons, and their synapses, block by block.
@@ -55,15 +59,40 @@ pub(super) struct Coupling<const N: usize> {
     pub weights: [f32; N],
 }
 
+/// A neuron, without the zeros of its block.
+#[derive(Debug)]
+pub(super) struct Row {
+    /// F, the same for both rows of a pair.
+    pub activation: Activation,
+    /// Factor of y in a substep, 1 - r.
+    pub retention: f32,
+    /// Its synapses in `Kernel::synapses`, by ascending rows.
+    pub synapses: Range<usize>,
+}
+
+/// A synapse between neurons.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Synapse {
+    /// Row of the presynaptic neuron.
+    pub pre: u32,
+    /// Contribution to y per substep and unit of its activity.
+    pub weight: f32,
+}
+
 impl Kernel {
     /// The kernel of a genotype.
     pub fn compile(network: &Network, wiring: &Wiring, phenotype: &Phenotype) -> Self {
-        Self {
+        let mut kernel = Self {
             n_substeps: network.n_substeps,
             initial_rates: network.initial_rates,
             quads: Blocks::compile(network, &wiring.quads, phenotype),
             pairs: Blocks::compile(network, &wiring.pairs, phenotype),
-        }
+            rows: Vec::new(),
+            synapses: Vec::new(),
+        };
+        kernel.quads.list(&mut kernel.rows, &mut kernel.synapses);
+        kernel.pairs.list(&mut kernel.rows, &mut kernel.synapses);
+        kernel
     }
 
     /// y of each row at the start.
@@ -92,6 +121,26 @@ impl Kernel {
 }
 
 impl<const N: usize> Blocks<N> {
+    /// Adds the neurons one by one.
+    fn list(&self, rows: &mut Vec<Row>, synapses: &mut Vec<Synapse>) {
+        for block in &self.blocks {
+            for place in 0..N {
+                let first = synapses.len();
+                for coupling in &self.recurrent[block.recurrent.clone()] {
+                    let (pre, weight) = (coupling.pre as u32, coupling.weights[place]);
+                    if weight != 0.0 {
+                        synapses.push(Synapse { pre, weight });
+                    }
+                }
+                rows.push(Row {
+                    activation: block.activation,
+                    retention: block.retention[place],
+                    synapses: first..synapses.len(),
+                });
+            }
+        }
+    }
+
     fn compile(network: &Network, wired: &WiredBlocks<N>, phenotype: &Phenotype) -> Self {
         let [tau, gain, bias] = ["tau", "gain", "bias"].map(|name| &phenotype.neurons[name]);
         let mut kernel = Self {

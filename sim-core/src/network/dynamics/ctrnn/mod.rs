@@ -14,11 +14,11 @@
 //! state is computed in f32, which `docs/notebook/2026-11-simulation.md` justifies. All constants
 //! are computed in f64 and rounded once.
 //!
-//! All lanes share the weights, and never interact. [`chunk`] computes whole vectors of lanes, in
-//! blocks of neurons that share the loads of presynaptic activities. [`remainder`] computes the
-//! remaining lanes, to the same bits. Two neurons share a division; the pairs depend only on the
-//! network's structure. [`plastic`] computes networks whose weights change while robots live; in
-//! these networks, every lane has its own weights.
+//! All lanes share the weights, and never interact. [`chunk`] computes whole vectors of lanes: many
+//! vectors neuron by neuron, few vectors in blocks of neurons that share the loads of presynaptic
+//! activities. [`remainder`] computes the remaining lanes, to the same bits. Two neurons share a
+//! division; the pairs depend only on the network's structure. [`plastic`] computes networks whose
+//! weights change while robots live; in these networks, every lane has its own weights.
 
 mod blueprint;
 mod chunk;
@@ -71,9 +71,9 @@ impl Ctrnn {
         let vector_len = isa.vector_len();
         let (mut n_vectors, mut n_left) = (n_lanes / vector_len, n_lanes % vector_len);
         // A vector of lanes costs one vector operation per row. A lane of a remainder costs one
-        // vector operation per `vector_len` rows.
+        // vector operation per `vector_len` rows, and half as much again for its broadcasts.
         let n_vectors_per_lane = kernel.n_rows().div_ceil(2 * vector_len) * 2;
-        if 2 * n_left * n_vectors_per_lane > kernel.n_rows() {
+        if 3 * n_left * n_vectors_per_lane > 2 * kernel.n_rows() {
             (n_vectors, n_left) = (n_vectors + 1, 0);
         }
         let n_chunks = n_vectors.div_ceil(chunk::MAX_WIDTH);

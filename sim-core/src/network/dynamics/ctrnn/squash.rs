@@ -31,30 +31,76 @@ pub(super) fn squash<S: Simd, const W: usize, const N: usize>(
     y: &[[S::f32s; W]; N],
     u: &mut [[S::f32s; W]; N],
 ) {
-    let pairs = y.as_chunks::<2>().0.iter().zip(u.as_chunks_mut::<2>().0);
-    match activation {
-        Activation::Sigmoid => {
-            for ([y0, y1], [u0, u1]) in pairs {
-                [*u0, *u1] = sigmoid(simd, y0, y1);
-            }
+    for (y, u) in y.as_chunks::<2>().0.iter().zip(u.as_chunks_mut::<2>().0) {
+        squash_pair(simd, activation, y, u);
+    }
+}
+
+/// u = F(y) of a pair. In wide rows, two or three vectors of both neurons are in step: fewer leave
+/// the processor waiting for a polynomial, and more do not fit in sixteen registers.
+#[inline(always)]
+fn squash_pair<S: Simd, const W: usize>(
+    simd: S,
+    activation: Activation,
+    y: &[[S::f32s; W]; 2],
+    u: &mut [[S::f32s; W]; 2],
+) {
+    match W {
+        4 => {
+            squash_part::<S, W, 2>(simd, activation, y, u, 0);
+            squash_part::<S, W, 2>(simd, activation, y, u, 2);
         }
-        Activation::Tanh => {
-            for ([y0, y1], [u0, u1]) in pairs {
-                [*u0, *u1] = tanh(simd, y0, y1);
+        5 => {
+            squash_part::<S, W, 3>(simd, activation, y, u, 0);
+            squash_part::<S, W, 2>(simd, activation, y, u, 3);
+        }
+        6 => {
+            squash_part::<S, W, 3>(simd, activation, y, u, 0);
+            squash_part::<S, W, 3>(simd, activation, y, u, 3);
+        }
+        _ => {
+            *u = match activation {
+                Activation::Sigmoid => {
+                    let [a] = one_plus_exp2(simd, &[y[0]]);
+                    let [b] = one_plus_exp2(simd, &[y[1]]);
+                    sigmoid(simd, [a, b])
+                }
+                Activation::Tanh => {
+                    let [a] = exp2_minus_one(simd, &[y[0]]);
+                    let [b] = exp2_minus_one(simd, &[y[1]]);
+                    tanh(simd, [a, b])
+                }
             }
         }
     }
 }
 
-/// 1 / (1 + 2^y), twice.
+/// u = F(y) of V vectors of a pair, from `first` on.
 #[inline(always)]
-fn sigmoid<S: Simd, const W: usize>(
+fn squash_part<S: Simd, const W: usize, const V: usize>(
     simd: S,
-    first: &[S::f32s; W],
-    second: &[S::f32s; W],
-) -> [[S::f32s; W]; 2] {
-    let mut a = one_plus_exp2(simd, first);
-    let mut b = one_plus_exp2(simd, second);
+    activation: Activation,
+    y: &[[S::f32s; W]; 2],
+    u: &mut [[S::f32s; W]; 2],
+    first: usize,
+) {
+    let mut part = [[y[0][0]; V]; 2];
+    for (part, y) in part.iter_mut().zip(y) {
+        part.copy_from_slice(&y[first..first + V]);
+    }
+    let part = match activation {
+        Activation::Sigmoid => sigmoid(simd, one_plus_exp2(simd, &part)),
+        Activation::Tanh => tanh(simd, exp2_minus_one(simd, &part)),
+    };
+    for (part, u) in part.iter().zip(u) {
+        u[first..first + V].copy_from_slice(part);
+    }
+}
+
+/// 1 / (1 + 2^y) from 1 + 2^y, twice.
+#[inline(always)]
+fn sigmoid<S: Simd, const W: usize>(simd: S, sums: [[S::f32s; W]; 2]) -> [[S::f32s; W]; 2] {
+    let [mut a, mut b] = sums;
     for vector in 0..W {
         let product = simd.mul_f32s(a[vector], b[vector]);
         let inverse = simd.div_f32s(simd.splat_f32s(1.0), product);
@@ -64,28 +110,31 @@ fn sigmoid<S: Simd, const W: usize>(
     [a, b]
 }
 
+/// 1 + 2^y of N neurons in step.
 #[inline(always)]
-fn one_plus_exp2<S: Simd, const W: usize>(simd: S, y: &[S::f32s; W]) -> [S::f32s; W] {
+fn one_plus_exp2<S: Simd, const W: usize, const N: usize>(
+    simd: S,
+    y: &[[S::f32s; W]; N],
+) -> [[S::f32s; W]; N] {
     let one = simd.splat_f32s(1.0);
     let Exp2 { s, mut q, f } = exp2_parts_of(simd, y);
-    for vector in 0..W {
-        q[vector] = simd.mul_add_f32s(q[vector], f[vector], one);
+    for (q, f) in q.iter_mut().zip(f) {
+        for vector in 0..W {
+            q[vector] = simd.mul_add_f32s(q[vector], f[vector], one);
+        }
     }
-    for vector in 0..W {
-        q[vector] = simd.mul_add_f32s(s[vector], q[vector], one);
+    for (q, s) in q.iter_mut().zip(s) {
+        for vector in 0..W {
+            q[vector] = simd.mul_add_f32s(s[vector], q[vector], one);
+        }
     }
     q
 }
 
-/// (2^y - 1) / (2^y + 1), twice.
+/// (2^y - 1) / (2^y + 1) from 2^y - 1, twice.
 #[inline(always)]
-fn tanh<S: Simd, const W: usize>(
-    simd: S,
-    first: &[S::f32s; W],
-    second: &[S::f32s; W],
-) -> [[S::f32s; W]; 2] {
-    let mut above_a = exp2_minus_one(simd, first);
-    let mut above_b = exp2_minus_one(simd, second);
+fn tanh<S: Simd, const W: usize>(simd: S, above: [[S::f32s; W]; 2]) -> [[S::f32s; W]; 2] {
+    let [mut above_a, mut above_b] = above;
     let two = simd.splat_f32s(2.0);
     for vector in 0..W {
         let a = simd.add_f32s(above_a[vector], two);
@@ -97,14 +146,19 @@ fn tanh<S: Simd, const W: usize>(
     [above_a, above_b]
 }
 
-/// Near y = 0, s is 1 and nothing cancels.
+/// 2^y - 1 of N neurons in step. Near y = 0, s is 1 and nothing cancels.
 #[inline(always)]
-fn exp2_minus_one<S: Simd, const W: usize>(simd: S, y: &[S::f32s; W]) -> [S::f32s; W] {
+fn exp2_minus_one<S: Simd, const W: usize, const N: usize>(
+    simd: S,
+    y: &[[S::f32s; W]; N],
+) -> [[S::f32s; W]; N] {
     let one = simd.splat_f32s(1.0);
     let Exp2 { s, mut q, f } = exp2_parts_of(simd, y);
-    for vector in 0..W {
-        let above = simd.sub_f32s(s[vector], one);
-        q[vector] = simd.mul_add_f32s(s[vector], simd.mul_f32s(q[vector], f[vector]), above);
+    for (q, (s, f)) in q.iter_mut().zip(s.iter().zip(f)) {
+        for vector in 0..W {
+            let above = simd.sub_f32s(s[vector], one);
+            q[vector] = simd.mul_add_f32s(s[vector], simd.mul_f32s(q[vector], f[vector]), above);
+        }
     }
     q
 }
@@ -130,11 +184,10 @@ mod tests {
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
             let lanes = self.y.chunks_exact(S::F32_LANES).flat_map(|y| {
                 let pair = [S::as_simd_f32s(y).0[0], simd.splat_f32s(self.other)];
-                let [u, other] = match self.activation {
-                    Activation::Sigmoid => sigmoid(simd, &[pair[0]], &[pair[1]]),
-                    Activation::Tanh => tanh(simd, &[pair[0]], &[pair[1]]),
-                };
-                let (u, other) = (bytemuck::cast_slice(&u), bytemuck::cast_slice(&other));
+                let mut activity = pair.map(|y| [y]);
+                squash(simd, self.activation, &pair.map(|y| [y]), &mut activity);
+                let [u, other] = &activity;
+                let (u, other) = (bytemuck::cast_slice(u), bytemuck::cast_slice(other));
                 let both = u.iter().zip(other).map(|(&u, &other): (&f32, &f32)| [u, other]);
                 both.collect::<Vec<_>>()
             });

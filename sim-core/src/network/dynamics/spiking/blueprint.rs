@@ -19,7 +19,7 @@ pub(in super::super) fn blueprint(
     wiring: &Wiring,
     phenotype: &Phenotype,
 ) -> SpikingNeurons {
-    let Circuit { n_neurons, encoders, afferent, outgoing, receptors, motor, filter, .. } =
+    let Circuit { n_neurons, encoders, afferent, outgoing, receptors, filter, .. } =
         Circuit::compile(network, wiring, phenotype);
     let [constants, starts] = match network.model {
         NeuronModel::Rate => unreachable!("the wiring is of spiking neurons"),
@@ -29,6 +29,7 @@ pub(in super::super) fn blueprint(
         NeuronModel::Izhikevich => values::<Izhikevich, _, _>(network, phenotype),
         NeuronModel::MorrisLecar => values::<MorrisLecar, _, _>(network, phenotype),
     };
+    let motor = network.ensembles.values().filter(|ensemble| ensemble.motor);
     let n_sources = n_neurons + encoders.n_nodes();
     SpikingNeurons {
         model: network.model,
@@ -39,7 +40,7 @@ pub(in super::super) fn blueprint(
         receptors: receptors.map(|receptors| receptors.blueprint(n_neurons)),
         lif: encoders.lif(),
         encoders: encoders.blueprint(),
-        motor,
+        motor: motor.flat_map(|ensemble| ensemble.neurons.clone()).collect(),
         filter: [filter.retention, filter.rise, filter.decay],
     }
 }
@@ -58,7 +59,12 @@ fn values<M: Model<C, Z>, const C: usize, const Z: usize>(
 pub(super) fn links(synapses: &Weighted, n: usize) -> Vec<Vec<Link>> {
     let of_group = |group| {
         let members = synapses.synapses_of(group).iter().zip(synapses.numbers_of(group));
-        members.map(|(&(other, weight), &synapse)| Link { other, weight, synapse }).collect()
+        let link = |(&(other, weight), &synapse): (&(u32, f32), &usize)| Link {
+            other: other as usize,
+            weight,
+            synapse,
+        };
+        members.map(link).collect()
     };
     (0..n).map(of_group).collect()
 }

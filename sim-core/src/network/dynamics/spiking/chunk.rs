@@ -31,8 +31,8 @@ pub(super) struct Chunk {
     /// 1 if a neuron spiked in the previous substep, or if a node of an encoder spikes in this
     /// substep, else 0: `[neuron, then node][lane]`.
     spikes: Aligned,
-    /// The neurons and nodes with a spike in any lane, ascending.
-    active: Vec<usize>,
+    /// The neurons and nodes with a spike in any lane.
+    active: Active,
     /// Contribution of stimuli to the current, `[neuron][lane]`.
     drive: Aligned,
     /// `[neuron][lane]`
@@ -44,9 +44,32 @@ pub(super) struct Chunk {
     memory: Option<Memory>,
     /// Spikes in the environment step, `[neuron, then node][lane]`.
     counts: Aligned,
-    /// Variables of motor neurons: the substep of the first spike, and x and a of the filter,
-    /// `[motor neuron][variable][lane]`.
-    motor: Aligned,
+    /// The substep of the first spike, `[timed neuron][lane]`.
+    first: Aligned,
+    /// x and a of the filter, `[filtered neuron][variable][lane]`.
+    filter: Aligned,
+}
+
+/// Spike sources, ascending.
+#[derive(Debug)]
+struct Active {
+    /// The first `n` of these, and scratch.
+    sources: Vec<usize>,
+    n: usize,
+}
+
+impl Active {
+    /// No source of `n_sources`.
+    fn new(n_sources: usize) -> Self {
+        Self { sources: vec![0; n_sources + 1], n: 0 }
+    }
+
+    /// Adds a source if it is active. The outcome is unpredictable, so the code has no branch.
+    #[inline(always)]
+    fn push_if(&mut self, is_active: bool, source: usize) {
+        self.sources[self.n] = source;
+        self.n += usize::from(is_active);
+    }
 }
 
 impl Chunk {
@@ -68,22 +91,21 @@ impl Chunk {
             n_variables: Z,
             state: rows(n_neurons * Z),
             spikes: rows(n_sources),
-            active: Vec::with_capacity(n_sources),
+            active: Active::new(n_sources),
             drive: rows(n_neurons),
             current: rows(n_neurons),
             receptors: circuit.receptors.as_ref().map(|_| ReceptorState::new(n_sources, n_lanes)),
             encoders: EncoderState::new(&circuit.encoders, n_lanes),
             memory: circuit.rule.as_ref().map(|rule| Memory::new(rule, n_lanes)),
             counts: rows(n_sources),
-            motor: rows(circuit.motor.len() * 3),
+            first: rows(circuit.timed.len()),
+            filter: rows(circuit.filtered.len() * 2),
         };
         let starts = neurons.starts.iter().flatten();
         for (row, &start) in chunk.state.values_mut().chunks_exact_mut(n_lanes).zip(starts) {
             row.fill(start);
         }
-        for rows in chunk.motor.values_mut().chunks_exact_mut(3 * n_lanes) {
-            rows[..n_lanes].fill(circuit.n_substeps as f32);
-        }
+        chunk.first.values_mut().fill(circuit.n_substeps as f32);
         chunk
     }
 
@@ -141,16 +163,18 @@ impl Chunk {
     /// Writes the data of motor neurons for decoders.
     pub fn write_window(&self, circuit: &Circuit, window: &mut SpikeWindow) {
         let n_lanes = self.n_lanes;
-        let motor = self.motor.values().chunks_exact(3 * n_lanes);
-        for (&neuron, rows) in circuit.motor.iter().zip(motor) {
+        let write = |lanes: &mut Lanes, neuron: usize, values: &[f32]| {
+            lanes.row_mut(neuron)[self.first_lane..][..n_lanes].copy_from_slice(values);
+        };
+        let first = self.first.values().chunks_exact(n_lanes);
+        for (&neuron, first) in circuit.timed.iter().zip(first) {
             let counts = &self.counts.values()[neuron * n_lanes..][..n_lanes];
-            for (lanes, values) in [
-                (&mut window.counts, counts),
-                (&mut window.first, &rows[..n_lanes]),
-                (&mut window.filtered, &rows[2 * n_lanes..]),
-            ] {
-                lanes.row_mut(neuron)[self.first_lane..][..n_lanes].copy_from_slice(values);
-            }
+            write(&mut window.counts, neuron, counts);
+            write(&mut window.first, neuron, first);
+        }
+        let filter = self.filter.values().chunks_exact(2 * n_lanes);
+        for (&neuron, variables) in circuit.filtered.iter().zip(filter) {
+            write(&mut window.filtered, neuron, &variables[n_lanes..]);
         }
     }
 
@@ -197,7 +221,7 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
                 circuit.afferent.synapses_of(neuron).iter().zip(numbers)
             {
                 let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
-                let stimulus = &stimuli.row(input)[chunk.first_lane..][..n_lanes];
+                let stimulus = &stimuli.row(input as usize)[chunk.first_lane..][..n_lanes];
                 accumulate(simd, &mut sum, weight, &rows::<S, W>(stimulus)[0]);
             }
             *drive = sum;
@@ -205,9 +229,7 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
         let lanes = chunk.first_lane..chunk.first_lane + n_lanes;
         circuit.encoders.perceive::<S, W>(simd, &mut chunk.encoders, stimuli, lanes);
         chunk.counts.values_mut().fill(0.0);
-        for rows in chunk.motor.values_mut().chunks_exact_mut(3 * n_lanes) {
-            rows[..n_lanes].fill(circuit.n_substeps as f32);
-        }
+        chunk.first.values_mut().fill(circuit.n_substeps as f32);
     }
 }
 
@@ -234,12 +256,12 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Propagate<'_, W, PLASTIC>
         let spikes = rows::<S, W>(chunk.spikes.values());
         let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
         let plastic = rows::<S, W>(plastic);
-        for &pre in &chunk.active {
+        for &pre in &chunk.active.sources[..chunk.active.n] {
             let numbers = circuit.outgoing.numbers_of(pre);
             for (&(post, shared), &number) in circuit.outgoing.synapses_of(pre).iter().zip(numbers)
             {
                 let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
-                accumulate(simd, &mut currents[post], weight, &spikes[pre]);
+                accumulate(simd, &mut currents[post as usize], weight, &spikes[pre]);
             }
         }
         if let (Some(receptors), Some(held)) = (&circuit.receptors, &mut chunk.receptors) {
@@ -270,9 +292,7 @@ fn encode<S: Simd, const W: usize>(
             let spiked = simd.greater_than_f32s(spike, none);
             is_active |= simd.first_true_m32s(spiked) < S::F32_LANES;
         }
-        if is_active {
-            chunk.active.push(n_neurons + node);
-        }
+        chunk.active.push_if(is_active, n_neurons + node);
     }
 }
 
@@ -295,7 +315,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
         let currents = rows::<S, W>(chunk.current.values());
         let spikes = rows_mut::<S, W>(chunk.spikes.values_mut());
         let counts = rows_mut::<S, W>(chunk.counts.values_mut());
-        chunk.active.clear();
+        chunk.active.n = 0;
         for (neuron, constants) in neurons.constants.iter().enumerate() {
             let mut splat = [zero; C];
             for (splat, &constant) in splat.iter_mut().zip(constants) {
@@ -316,9 +336,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
                 counts[neuron][vector] = simd.add_f32s(counts[neuron][vector], spike);
                 is_active |= simd.first_true_m32s(spiked) < S::F32_LANES;
             }
-            if is_active {
-                chunk.active.push(neuron);
-            }
+            chunk.active.push_if(is_active, neuron);
         }
     }
 }
@@ -342,12 +360,18 @@ impl<const W: usize> WithSimd for Listen<'_, W> {
                 .map(|constant| simd.splat_f32s(constant));
         let now = simd.splat_f32s(substep as f32);
         let spikes = rows::<S, W>(chunk.spikes.values());
-        let motor = rows_mut::<S, W>(chunk.motor.values_mut()).as_chunks_mut::<3>().0;
-        for (&neuron, [first, x, a]) in circuit.motor.iter().zip(motor) {
+        let first = rows_mut::<S, W>(chunk.first.values_mut());
+        for (&neuron, first) in circuit.timed.iter().zip(first) {
             for vector in 0..W {
                 let spiked = simd.equal_f32s(spikes[neuron][vector], one);
                 let earliest = simd.min_f32s(first[vector], now);
                 first[vector] = simd.select_f32s(spiked, earliest, first[vector]);
+            }
+        }
+        let filter = rows_mut::<S, W>(chunk.filter.values_mut()).as_chunks_mut::<2>().0;
+        for (&neuron, [x, a]) in circuit.filtered.iter().zip(filter) {
+            for vector in 0..W {
+                let spiked = simd.equal_f32s(spikes[neuron][vector], one);
                 let decayed = simd.mul_f32s(x[vector], retention);
                 x[vector] = simd.select_f32s(spiked, one, decayed);
                 let growth = simd.mul_f32s(rise, x[vector]);

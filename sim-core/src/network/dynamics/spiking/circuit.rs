@@ -1,7 +1,7 @@
 //! A spiking network with its values, in the order of computation; [`neurons`](super::neurons)
 //! computes the neurons themselves.
 
-use std::ops::Range;
+use std::{collections::BTreeSet, ops::Range};
 
 use determinism::simd::Simd;
 
@@ -9,7 +9,10 @@ use super::super::learning::Rule;
 use super::encoding::Encoders;
 use super::receptors::Receptors;
 use super::wiring::{Grouped, Wiring};
-use crate::network::{Network, Phenotype};
+use crate::network::{
+    Network, Phenotype,
+    decoding::{Decoder, Output},
+};
 
 /// The values of a genotype for a [`Wiring`].
 #[derive(Debug)]
@@ -26,8 +29,10 @@ pub(super) struct Circuit {
     pub receptors: Option<Receptors>,
     /// The learning rule; `None` without plasticity.
     pub rule: Option<Rule>,
-    /// Neurons that outputs decode, ascending.
-    pub motor: Vec<usize>,
+    /// Neurons whose decoders need the first spike, and the number of spikes, ascending.
+    pub timed: Vec<usize>,
+    /// Neurons whose decoders need filtered spikes, ascending.
+    pub filtered: Vec<usize>,
     /// The filter of spikes for decoders.
     pub filter: Filter,
 }
@@ -37,7 +42,7 @@ pub(super) struct Circuit {
 pub(super) struct Weighted {
     groups: Vec<Range<usize>>,
     /// Of each synapse, the side that its group does not share, and the weight.
-    members: Vec<(usize, f32)>,
+    members: Vec<(u32, f32)>,
     /// The number of each synapse.
     numbers: Vec<usize>,
 }
@@ -67,7 +72,9 @@ impl Filter {
 impl Circuit {
     /// The circuit of a genotype.
     pub fn compile(network: &Network, wiring: &Wiring, phenotype: &Phenotype) -> Self {
-        let motor = network.ensembles.values().filter(|ensemble| ensemble.motor);
+        let is_filtered =
+            |output: &&Output| matches!(output.decoder, Decoder::LinearPopulation { .. });
+        let (filtered, timed) = network.outputs.iter().partition(is_filtered);
         Self {
             n_neurons: network.n_neurons(),
             n_substeps: network.n_substeps,
@@ -78,7 +85,8 @@ impl Circuit {
                 .receptors
                 .map(|params| Receptors::new(params, wiring, phenotype, network.dt)),
             rule: Rule::compile(network, phenotype),
-            motor: motor.flat_map(|ensemble| ensemble.neurons.clone()).collect(),
+            timed: neurons_of(timed),
+            filtered: neurons_of(filtered),
             filter: Filter::new(network.dt),
         }
     }
@@ -89,17 +97,25 @@ impl Circuit {
     }
 }
 
+/// The neurons of outputs, ascending, each once.
+fn neurons_of(outputs: Vec<&Output>) -> Vec<usize> {
+    let neurons: BTreeSet<usize> =
+        outputs.into_iter().flat_map(|output| output.neurons.clone()).collect();
+    neurons.into_iter().collect()
+}
+
 impl Weighted {
     pub fn new(grouped: &Grouped, phenotype: &Phenotype) -> Self {
         let weight = |number: usize| phenotype.weights[number] as f32;
-        let members = grouped.members.iter().map(|member| (member.other, weight(member.synapse)));
+        let members =
+            grouped.members.iter().map(|member| (member.other as u32, weight(member.synapse)));
         let numbers = grouped.members.iter().map(|member| member.synapse).collect();
         Self { groups: grouped.groups.clone(), members: members.collect(), numbers }
     }
 
     /// Synapses of a group.
     #[inline(always)]
-    pub fn synapses_of(&self, group: usize) -> &[(usize, f32)] {
+    pub fn synapses_of(&self, group: usize) -> &[(u32, f32)] {
         &self.members[self.groups[group].clone()]
     }
 

@@ -80,8 +80,8 @@ impl Receptors {
         }
     }
 
-    /// Adds the synaptic currents of a substep. `spikes`: of neurons in the previous substep, and of
-    /// nodes of encoders in this substep. `states`: the variables of the neurons, `n_variables`
+    /// Adds the synaptic currents of a substep. `spikes`: of neurons in the previous substep, and
+    /// of nodes of encoders in this substep. `states`: the variables of the neurons, `n_variables`
     /// each, v first. `weights`: those of plastic synapses, by their number.
     #[inline(always)]
     pub fn propagate<S: Simd, const W: usize, const PLASTIC: bool>(
@@ -137,7 +137,7 @@ impl Receptors {
                 for (&(pre, shared), &number) in synapses.iter().zip(incoming.numbers_of(neuron)) {
                     let weight = weight::<S, W, PLASTIC>(simd, shared, number, weights);
                     for vector in 0..W {
-                        let s = open[pre][variable][vector];
+                        let s = open[pre as usize][variable][vector];
                         sum[vector] = simd.mul_add_f32s(weight[vector], s, sum[vector]);
                     }
                 }

@@ -1,6 +1,7 @@
 //! Compares spiking networks with themselves, on other instruction sets and in other lanes.
 
 use crate::lanes::Lanes;
+use crate::network::decoding::Decoder;
 use crate::network::dynamics::NetworkState;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
@@ -154,7 +155,7 @@ fn a_lane_does_not_depend_on_its_place_or_its_neighbours() {
 }
 
 #[test]
-fn a_window_has_counts_and_first_spikes_of_motor_neurons() {
+fn a_window_has_the_data_that_the_decoder_of_each_motor_neuron_needs() {
     let mut config = experiment_a_spiking(NeuronModel::Lif);
     config.topology.time_scale = 40;
     let network = compiled(&config);
@@ -167,11 +168,13 @@ fn a_window_has_counts_and_first_spikes_of_motor_neurons() {
     let mut n_first = 0;
     let mut counts = vec![[0.0; 3]; network.0.n_neurons()];
     let mut first = vec![[40.0; 3]; network.0.n_neurons()];
-    let motor: Vec<usize> =
-        network.0.outputs.iter().flat_map(|output| output.neurons.clone()).collect();
+    let outputs = network.0.outputs.iter();
+    let motor: Vec<(usize, Decoder)> = outputs
+        .flat_map(|output| output.neurons.clone().map(|neuron| (neuron, output.decoder)))
+        .collect();
     for substep in 0..40 {
         substeps.step(&held);
-        for &neuron in &motor {
+        for &(neuron, _) in &motor {
             for lane in 0..3 {
                 if substeps.activity().get(neuron, lane) > 0.0 {
                     counts[neuron][lane] += 1.0;
@@ -183,11 +186,17 @@ fn a_window_has_counts_and_first_spikes_of_motor_neurons() {
     }
     assert!(n_first > 3, "{n_first}");
     let (window, last) = (window.window().unwrap(), substeps.window().unwrap());
-    for &neuron in &motor {
+    let mut n_timed = 0;
+    for &(neuron, decoder) in &motor {
         for lane in 0..3 {
-            assert_eq!(window.counts.get(neuron, lane), counts[neuron][lane]);
-            assert_eq!(window.first.get(neuron, lane), first[neuron][lane]);
-            assert_eq!(window.filtered.get(neuron, lane), last.filtered.get(neuron, lane));
+            if decoder == Decoder::FirstToSpike {
+                assert_eq!(window.counts.get(neuron, lane), counts[neuron][lane]);
+                assert_eq!(window.first.get(neuron, lane), first[neuron][lane]);
+                n_timed += 1;
+            } else {
+                assert_eq!(window.filtered.get(neuron, lane), last.filtered.get(neuron, lane));
+            }
         }
     }
+    assert!((1..3 * motor.len()).contains(&n_timed), "both kinds: {n_timed}");
 }
