@@ -1,21 +1,26 @@
 //! The requests of a page, and their answers.
 
+use std::time::Duration;
+
 use bundle::Sample;
 use serde::{Deserialize, Serialize};
-use sim_core::Simulation;
+use sim_core::{Simulation, TrialSet};
 
 use crate::{
+    fleet::{Health, Report, TwoFleets},
     message::{self, bytes_of, numbers_of},
     proving::Proving,
-    simulating::{Trials, compile},
+    replaying::Played,
+    simulating::compile,
 };
 
 /// Generations that a call repeats at most, so that a page can show progress and cancel.
 const GENERATIONS_PER_CALL: u32 = 10;
 
-/// What a module remembers between two calls: a bundle, or a compiled experiment.
+/// What a module remembers between two calls: a bundle, a compiled experiment, or fleets.
 #[derive(Default)]
 pub struct Session {
+    fleets: Option<TwoFleets>,
     proving: Option<Proving>,
     simulation: Option<Simulation>,
 }
@@ -37,8 +42,20 @@ enum Request {
     Finish,
     /// Compiles an experiment file.
     Compile { config: String },
+    /// Simulates an episode of the genotype that follows, with changes. Its packed form follows the
+    /// answer.
+    Replay { played: Played, what_if: String },
     /// Simulates the genotype that follows. Its numbers, trial by trial, follow the answer.
-    Evaluate { trials: Trials, n_trials: u32, values_per_trial: usize },
+    Evaluate { trials: TrialSet, n_trials: u32, values_per_trial: usize },
+    /// Begins a run on two fleets.
+    BeginFleets {
+        /// The share of the individuals that two workers compute.
+        audits: f64,
+    },
+    /// Lets this time pass, ms.
+    Advance { ms: f64 },
+    /// Changes the state of a worker's machine in the disturbed fleet.
+    Treat { worker: usize, health: Health },
 }
 
 #[derive(Serialize)]
@@ -49,6 +66,8 @@ enum Answer {
     Done {},
     Proof { proof: String },
     Compiled { genes: usize },
+    Begun { workers: Vec<String>, generations: u64, report: Box<Report> },
+    Reported(Box<Report>),
     Failed { error: String },
 }
 
@@ -56,7 +75,7 @@ enum Answer {
 struct BatchAnswer {
     /// The name for people.
     name: String,
-    trials: Trials,
+    trials: TrialSet,
     n_genotypes: usize,
     n_trials: u32,
     /// The fitness, and the descriptors if the experiment has some.
@@ -88,7 +107,7 @@ impl Session {
                         bytes_of(batch.genotypes.iter().flat_map(|genes| &**genes).copied());
                     BatchAnswer {
                         name: batch.trial_set.to_string(),
-                        trials: batch.trial_set.into(),
+                        trials: batch.trial_set,
                         n_genotypes: batch.genotypes.len(),
                         n_trials: batch.n_trials(),
                         values_per_trial: batch.values_per_trial,
@@ -109,6 +128,10 @@ impl Session {
                 let simulation = self.simulation.insert(compile(&config)?);
                 Answer::Compiled { genes: simulation.genotype_len() }
             }
+            Request::Replay { played, what_if } => {
+                following = played.simulate(&what_if, &numbers_of(bytes)?)?;
+                Answer::Done {}
+            }
             Request::Evaluate { trials, n_trials, values_per_trial } => {
                 let simulation = self.simulation.as_ref().ok_or("no experiment is compiled")?;
                 let genotype = numbers_of(bytes)?;
@@ -120,8 +143,30 @@ impl Session {
                 following = bytes_of(values.unwrap_or_default());
                 Answer::Done {}
             }
+            Request::BeginFleets { audits } => {
+                let fleets = self.fleets.insert(TwoFleets::new(audits)?);
+                let workers = fleets.names().into_iter().map(str::to_owned).collect();
+                let report = Box::new(fleets.report());
+                Answer::Begun { workers, generations: fleets.n_generations(), report }
+            }
+            Request::Advance { ms } => {
+                let time = Duration::try_from_secs_f64(ms / 1000.0);
+                let time = time.map_err(|error| format!("{ms} ms: {error}"))?;
+                let fleets = self.fleets()?;
+                fleets.advance(time)?;
+                Answer::Reported(Box::new(fleets.report()))
+            }
+            Request::Treat { worker, health } => {
+                let fleets = self.fleets()?;
+                fleets.treat(worker, health)?;
+                Answer::Reported(Box::new(fleets.report()))
+            }
         };
         Ok((answer, following))
+    }
+
+    fn fleets(&mut self) -> Result<&mut TwoFleets, String> {
+        self.fleets.as_mut().ok_or_else(|| "no fleet has begun".to_owned())
     }
 
     fn proving(&mut self) -> Result<&mut Proving, String> {

@@ -1,4 +1,5 @@
-// The simulator for browsers in Node: it proves bundles in the words of the other programs.
+// The simulator for browsers in Node: it proves bundles in the words of the other programs, and its
+// fleet has the digest of every other fleet.
 //
 //     node crates/browser/tests/node.mjs SIMULATOR.wasm.gz SWARMCTL BUNDLE...
 
@@ -60,3 +61,38 @@ for (const file of bundles) {
   if (expectedLines.join() !== lines.join()) throw new Error(`${file}:\n${lines.join("\n")}\n${expectedLines.join("\n")}`);
   console.log(`${file}: ${lines.length} lines as swarmctl prints them`);
 }
+
+/** Runs the fleet of the page to its end, and treats workers badly on the way. */
+function breakFleet() {
+  const call = start();
+  let [{ report, workers }] = call({ call: "begin-fleets", audits: 1 });
+  const quarantined = new Set();
+  const take = ([next]) => {
+    report = next;
+    for (const event of report.events) if (event.what === "quarantined") quarantined.add(event.worker);
+  };
+  const treat = (worker, health) => take(call({ call: "treat", worker, health }));
+  const faults = ["killed", "hung", "slow", "lying"];
+  const liars = new Set();
+  for (let i = 0; i < 10_000 && (report.disturbed.over_at === null || report.undisturbed.over_at === null); i++) {
+    const worker = (7 * i) % workers.length;
+    if (i % 4 === 0) {
+      const health = faults[(i / 4) % 4];
+      if (health === "lying") liars.add(worker);
+      treat(worker, health);
+    }
+    if (i % 4 === 3) treat((7 * (i + 11)) % workers.length, "healthy");
+    take(call({ call: "advance", ms: 3000 }));
+  }
+  const [mine, others] = [report.disturbed, report.undisturbed];
+  const digest = mine.links.at(-1)?.digest;
+  if (mine.over_at === null || digest !== others.links.at(-1).digest || digest !== QUICKSTART) throw new Error(`digest ${digest}`);
+  if (quarantined.size === 0) throw new Error("no liar was found");
+  for (const worker of quarantined) if (!liars.has(worker)) throw new Error(`worker ${worker} never lied`);
+  return quarantined.size;
+}
+
+const QUICKSTART = "c11a2917b82381af1a41371a42c3911ac5021fcc9648ee67041e4e9f52290003";
+const began = performance.now();
+const n_found = breakFleet();
+console.log(`a fleet treated badly has quickstart's digest after ${((performance.now() - began) / 1000).toFixed(1)} s; ${n_found} liars were found`);

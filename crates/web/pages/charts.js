@@ -1,8 +1,8 @@
 // Charts as SVG: lines over bands with axes, with zoom, keys and export.
 
-import { decimals, element } from "swarm/dom.js";
+import { decimals, element, onKeys } from "swarm/dom.js";
 import { exports, seriesTable } from "swarm/export.js";
-import { extremes, thinned, ticks } from "swarm/scales.js";
+import { STOPS, clamp, extremes, thinned, ticks } from "swarm/scales.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 /** Maximum number of entries in a closed legend. */
@@ -15,6 +15,11 @@ export function shape(tag, attributes, ...children) {
   for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
   node.append(...children);
   return node;
+}
+
+/** A text of an axis. */
+export function text(x, y, content, more = {}) {
+  return shape("text", { x, y, class: "axis", ...more }, content);
 }
 
 /** A small curve without axes. */
@@ -36,6 +41,22 @@ export function path(points) {
  *  aligned. */
 export const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
 
+/** A frame around a cell of a map, visible on every colour. */
+export function markCell(context, x, y, width, height) {
+  for (const [style, wide] of [["#000000", 4], ["#ffffff", 2]]) {
+    context.strokeStyle = style;
+    context.lineWidth = wide;
+    context.strokeRect(x, y, Math.max(width, 3), Math.max(height, 3));
+  }
+}
+
+/** The legend of the colours of fitness. */
+export function fitnessScale(low, high) {
+  const ramp = element("i", { className: "ramp" });
+  ramp.style.background = `linear-gradient(to right, ${STOPS.map((color) => `rgb(${color.join(" ")})`).join(", ")})`;
+  return [`fitness ≤ ${decimals(low, 2)} `, ramp, ` ≥ ${decimals(high, 2)}`];
+}
+
 /** A map for a file: its axes, and the canvas of its cells within them. `stage`: the element of the
  *  page that holds both. */
 export function mapFigure(stage, axes, cells) {
@@ -50,10 +71,36 @@ export function mapFigure(stage, axes, cells) {
   return svg;
 }
 
-/** Lines and labels of both axes. `inner`: the edges of the area between them; `x` and `y`: the
- *  pixel of a value; `x0` to `x1` and `y0` to `y1`: the visible values. */
-export function axes({ inner, x0, x1, x }, y0, y1, y, height, xLabel, yLabel) {
-  const text = (at, content, more = {}) => shape("text", { x: at[0], y: at[1], class: "axis", ...more }, content);
+/** The plane of a figure. `inner`: the edges of its area; `x0` to `x1` and `y0` to `y1`: the visible
+ *  values; `x` and `y`: the pixel of a value. */
+function planeOf(inner, [x0, x1], [y0, y1]) {
+  const x = (value) => inner.left + ((value - x0) / (x1 - x0 || 1)) * (inner.right - inner.left);
+  const y = (value) => inner.bottom - ((value - y0) / (y1 - y0)) * (inner.bottom - inner.top);
+  return { inner, x0, x1, x, y0, y1, y };
+}
+
+/** The range of values with room at both ends, a share of its length. */
+function roomy(values, share) {
+  const [low, high] = extremes(values);
+  const room = high - low < 1e-12 ? 0.5 : share * (high - low);
+  return [low - room, high + room];
+}
+
+/** Draws the axes of a scatter plot into the SVG `frame`, and returns its plane; null without points
+ *  or size. `xs` and `ys`: the values of the points; `room`: around them, as shares of their ranges. */
+export function scatterPlane(stage, frame, xs, ys, room, xLabel, yLabel) {
+  const [width, height] = [stage.clientWidth, stage.clientHeight];
+  frame.replaceChildren();
+  if (!width || xs.length === 0) return null;
+  const inner = { left: EDGE.left, right: width - EDGE.right, top: EDGE.top, bottom: height - EDGE.bottom };
+  const plane = planeOf(inner, roomy(xs, room), roomy(ys, room));
+  frame.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  frame.append(...axes(plane, height, xLabel, yLabel));
+  return plane;
+}
+
+/** Lines and labels of both axes of a plane. */
+function axes({ inner, x0, x1, x, y0, y1, y }, height, xLabel, yLabel) {
   const heights = ticks(y0, y1, 5);
   const places = ticks(x0, x1, Math.min(8, (inner.right - inner.left) / 90));
   // As many digits as distinguish neighbouring ticks.
@@ -62,10 +109,10 @@ export function axes({ inner, x0, x1, x }, y0, y1, y, height, xLabel, yLabel) {
   return [
     ...heights.flatMap((tick) => [
       shape("line", { x1: inner.left, x2: inner.right, y1: y(tick), y2: y(tick), class: "grid" }),
-      text([inner.left - 6, y(tick) + 4], decimals(tick, digits), { "text-anchor": "end" })]),
-    ...places.map((tick) => text([x(tick), inner.bottom + 16], String(Number(tick.toPrecision(6))).replace("-", "−"), { "text-anchor": "middle" })),
-    text([(inner.left + inner.right) / 2, height - 6], xLabel, { "text-anchor": "middle" }),
-    text([14, middle], yLabel, { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }),
+      text(inner.left - 6, y(tick) + 4, decimals(tick, digits), { "text-anchor": "end" })]),
+    ...places.map((tick) => text(x(tick), inner.bottom + 16, String(Number(tick.toPrecision(6))).replace("-", "−"), { "text-anchor": "middle" })),
+    text((inner.left + inner.right) / 2, height - 6, xLabel, { "text-anchor": "middle" }),
+    text(14, middle, yLabel, { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }),
   ];
 }
 
@@ -102,21 +149,18 @@ export function chart(label, { onZoom = () => {}, empty = "there is nothing to s
     frame = null;
     if (all.length === 0) {
       legend.replaceChildren();
-      return svg.replaceChildren(shape("text", { x: width / 2, y: height / 2, class: "axis", "text-anchor": "middle" }, empty));
+      return svg.replaceChildren(text(width / 2, height / 2, empty, { "text-anchor": "middle" }));
     }
     const [x0, x1] = zoom ?? extremes(all.map((point) => point[0]));
     const seen = all.filter(([x]) => x >= x0 && x <= x1);
-    let [y0, y1] = extremes([...seen.flatMap((point) => point.slice(1)), ...marks.flatMap((mark) => [mark.low, mark.high])]);
-    [y0, y1] = y1 - y0 < 1e-12 ? [y0 - 0.5, y1 + 0.5] : [y0 - 0.04 * (y1 - y0), y1 + 0.04 * (y1 - y0)];
-    const x = (value) => inner.left + ((value - x0) / (x1 - x0 || 1)) * (inner.right - inner.left);
-    const y = (value) => inner.bottom - ((value - y0) / (y1 - y0)) * (inner.bottom - inner.top);
-    frame = { inner, x0, x1, x };
-    svg.replaceChildren(...axes(frame, y0, y1, y, height, xLabel, yLabel), curves(frame, y, { lines, bands, marks }), shape("g", { class: "cursor" }));
+    const heights = [...seen.flatMap((point) => point.slice(1)), ...marks.flatMap((mark) => [mark.low, mark.high])];
+    frame = planeOf(inner, [x0, x1], roomy(heights, 0.04));
+    svg.replaceChildren(...axes(frame, height, xLabel, yLabel), curves(frame, { lines, bands, marks }), shape("g", { class: "cursor" }));
     drawLegend([...lines, ...marks]);
     drawCursor();
   };
 
-  const curves = ({ inner, x0, x1, x }, y, { lines, bands, marks }) => {
+  const curves = ({ inner, x0, x1, x, y }, { lines, bands, marks }) => {
     const inView = (points) => points.filter((point, i) => (points[i + 1]?.[0] ?? point[0]) >= x0 && (points[i - 1]?.[0] ?? point[0]) <= x1);
     const clip = shape("clipPath", { id: clipId }, shape("rect", { x: inner.left, y: 0, width: inner.right - inner.left, height: inner.bottom + 2 }));
     const clipped = shape("g", { "clip-path": `url(#${clipId})` }, clip);
@@ -213,13 +257,16 @@ export function chart(label, { onZoom = () => {}, empty = "there is nothing to s
     if ((to - from) / (frame.x1 - frame.x0) > 0.02) zoomTo([from, to]);
   });
   svg.addEventListener("dblclick", () => zoomTo(null));
-  svg.addEventListener("keydown", (event) => {
-    if (!frame || event.ctrlKey || event.altKey || event.metaKey) return;
+  onKeys(svg, (by) => {
+    if (!frame) return null;
     const points = shown.lines.find((line) => line.points.length)?.points ?? [];
     const inside = points.map(([x]) => x).filter((x) => x >= frame.x0 && x <= frame.x1);
     const place = cursor === null ? -1 : inside.findLastIndex((x) => x <= cursor);
-    const go = (to) => (cursor = inside[Math.max(0, Math.min(inside.length - 1, to))] ?? null);
-    const by = event.shiftKey ? 10 : 1;
+    const look = (at) => {
+      cursor = at ?? null;
+      drawCursor();
+    };
+    const go = (to) => look(inside[clamp(to, inside.length)]);
     const scaled = (factor) => {
       const middle = cursor ?? (frame.x0 + frame.x1) / 2;
       const [low, high] = extremes(points.map(([x]) => x));
@@ -227,17 +274,13 @@ export function chart(label, { onZoom = () => {}, empty = "there is nothing to s
       const isAll = range[0] <= low && range[1] >= high;
       zoomTo(isAll ? null : [Math.max(low, range[0]), Math.min(high, range[1])]);
     };
-    const actions = {
+    return {
       ArrowRight: () => go(place + by), ArrowLeft: () => go((place < 0 ? inside.length : place) - by), Home: () => go(0), End: () => go(inside.length - 1),
       "+": () => scaled(0.5), "=": () => scaled(0.5), "-": () => scaled(2), Escape: () => {
-        cursor = null;
+        look(null);
         zoomTo(null);
       },
     };
-    if (!actions[event.key]) return;
-    event.preventDefault();
-    actions[event.key]();
-    drawCursor();
   });
   new ResizeObserver(draw).observe(node);
   node.show = (content) => {

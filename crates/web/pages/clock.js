@@ -1,5 +1,7 @@
 // The moment that players show: one clock for all players side by side.
 
+import { clamp } from "swarm/scales.js";
+
 /** Steps per second. */
 const SPEEDS = [2, 5, 10, 20, 40, 80, 160, 320];
 
@@ -66,9 +68,4 @@ export class Clock {
   tell() {
     for (const player of this.players) player.tick();
   }
-}
-
-/** A whole number from 0 to n - 1. */
-export function clamp(value, n) {
-  return Math.max(0, Math.min(n - 1, value));
 }

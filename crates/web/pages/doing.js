@@ -11,8 +11,8 @@ export function whatItDoes(it) {
     parts.push(element("p", { className: "bad" }, it.workers_of_others ? `No worker takes it: ${counted(it.workers_of_others, "worker")} only for other experiments.` : it.workers ? "No connected worker gets work." : "No worker is connected: start one with `worker`."));
   }
   if (it.round) {
-    const { generation, kind, episodes, episodes_left: left, items_queued: queued, running_ms: running, held } = it.round;
-    parts.push(element("p", {}, `${kind} ${kind === "generation" ? generation : `after generation ${generation}`}: ${episodes - left} of ${episodes} episodes in ${span(running)}`),
+    const { name, episodes, episodes_left: left, items_queued: queued, running_ms: running, held } = it.round;
+    parts.push(element("p", {}, `${name}: ${episodes - left} of ${episodes} episodes in ${span(running)}`),
       element("progress", { max: episodes, value: episodes - left }),
       element("p", { className: "muted" }, `${counted(queued, "item")} without a worker, the others at ${counted(held.length, "worker")}`));
     const rows = held.sort((a, b) => b[2] - a[2]).slice(0, 6).map(([worker, items, ms]) =>

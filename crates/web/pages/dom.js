@@ -52,6 +52,19 @@ export function canvas(draw, label) {
   return node;
 }
 
+/** Lets keys act on an element that has the focus. `actionsOf(by)`: the action of each key, nothing
+ *  while there is nothing to act on; `by`: 10 with Shift, otherwise 1. */
+export function onKeys(node, actionsOf) {
+  node.addEventListener("keydown", (event) => {
+    // The browser's own shortcuts stay.
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const action = actionsOf(event.shiftKey ? 10 : 1)?.[event.key];
+    if (!action) return;
+    event.preventDefault();
+    action();
+  });
+}
+
 /** A number with a number of decimals, and a true minus sign. Tiny and huge numbers get a power of
  *  ten. */
 export function decimals(value, n) {

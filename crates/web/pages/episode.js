@@ -1,4 +1,4 @@
-// A packed episode; crates/web/src/replay/mod.rs describes the format.
+// A packed episode; crates/replay/src/lib.rs describes the format.
 
 /** Farther than anything in a world between walls, cm. */
 const BEYOND = 1e9;
@@ -73,6 +73,17 @@ export class Episode {
     // A robot that is moved elsewhere does not glide there.
     const part = Math.abs(dx) + Math.abs(dy) > 50 ? 0 : share;
     return { x: x + part * dx, y: y + part * dy, heading: heading + part * turn };
+  }
+
+  /** The coordinates of a robot, light, area or movable, cm. */
+  placeOf(kind, number, step) {
+    const prefix = kind === "robot" ? "" : `${kind}_`;
+    return ["x", "y"].map((axis) => this.at(`${prefix}${axis}`, number, step));
+  }
+
+  /** Number of robots, lights, areas or movables. */
+  countOf(kind) {
+    return { robot: this.n_robots, light: this.lights.length, area: this.areas.length, movable: this.room?.movables.length ?? 0 }[kind];
   }
 
   /** Position and heading of a movable; between steps, at a share of the way. */

@@ -1,6 +1,6 @@
 // All experiments, kept up to date: the whole list once, and then the changes.
 
-import { askJson, complain, listen, resolve } from "swarm/page.js";
+import { AGAIN_AFTER, askJson, complain, listen, resolve } from "swarm/page.js";
 
 /** Follows the list. `onChange(experiments, changed)`: all experiments by id, and the ids of new,
  *  changed and deleted ones. */
@@ -32,9 +32,6 @@ export async function followExperiments(onChange) {
   };
   await begin();
 }
-
-/** Time until a failed request for the list is repeated, ms. */
-const AGAIN_AFTER = 2000;
 
 /** All experiments in their present state, oldest first. */
 export async function allExperiments() {

@@ -1,17 +1,15 @@
 // The fitness of each child over the fitness of its parents. The server repeats the generations to
 // find the parents, so the page requests them only when the user opens this part.
 
-import { axes, shape } from "swarm/charts.js";
-import { canvas, decimals, element } from "swarm/dom.js";
+import { EDGE, scatterPlane, shape } from "swarm/charts.js";
+import { canvas, decimals, element, onKeys } from "swarm/dom.js";
 import { palette } from "swarm/drawing.js";
 import { exports } from "swarm/export.js";
 import { askJson } from "swarm/page.js";
-import { extremes } from "swarm/scales.js";
+import { clamp } from "swarm/scales.js";
 
 /** Maximum number of shown children; for longer runs, the page requests only every n-th generation. */
 const CHILDREN_MAX = 100_000;
-/** Margins around the points, pixels: those of the map of individuals. */
-const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
 /** Maximum distance between a pointer and the point that it selects, pixels. */
 const NEAR = 14;
 /** The origin of a child: a name, its meaning, and its colour in the style. */
@@ -94,19 +92,11 @@ export function familiesPanel(id) {
   };
 
   const drawFrame = () => {
-    const [width, height] = [stage.clientWidth, stage.clientHeight];
-    scale = null;
-    if (!width || shown.length === 0) return frame.replaceChildren();
-    const wider = ([low, high]) => (high - low < 1e-12 ? [low - 0.5, high + 0.5] : [low - 0.03 * (high - low), high + 0.03 * (high - low)]);
-    const [[x0, x1], [y0, y1]] = [wider(extremes(shown.map((it) => it.x))), wider(extremes(shown.map((it) => it.fitness)))];
-    const inner = { left: EDGE.left, right: width - EDGE.right, top: EDGE.top, bottom: height - EDGE.bottom };
-    const x = (value) => inner.left + ((value - x0) / (x1 - x0)) * (inner.right - inner.left);
-    const y = (value) => inner.bottom - ((value - y0) / (y1 - y0)) * (inner.bottom - inner.top);
-    scale = { x, y };
-    frame.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    scale = scatterPlane(stage, frame, shown.map((it) => it.x), shown.map((it) => it.fitness), 0.03, "mean fitness of the parents", "fitness of the child");
+    if (!scale) return;
+    const { x0, x1, x, y0, y1, y } = scale;
     const [from, to] = [Math.max(x0, y0), Math.min(x1, y1)];
-    const diagonal = from < to ? [shape("line", { x1: x(from), y1: y(from), x2: x(to), y2: y(to), class: "diagonal" })] : [];
-    frame.replaceChildren(...axes({ inner, x0, x1, x }, y0, y1, y, height, "mean fitness of the parents", "fitness of the child"), ...diagonal);
+    if (from < to) frame.append(shape("line", { x1: x(from), y1: y(from), x2: x(to), y2: y(to), class: "diagonal" }));
   };
 
   /** The opacity of the points of a kind: overlapping points form a cloud. */
@@ -162,11 +152,9 @@ export function familiesPanel(id) {
     look(nearest(event));
     play();
   });
-  stage.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || shown.length === 0) return;
-    const last = shown.length - 1;
-    const by = event.shiftKey ? 10 : 1;
-    const at = (to) => look(Math.max(0, Math.min(last, to)));
+  onKeys(stage, (by) => {
+    if (shown.length === 0) return null;
+    const at = (to) => look(clamp(to, shown.length));
     /** The same individual in the previous or next generation, if shown. */
     const beside = (sign) => {
       const it = shown[cursor ?? 0];
@@ -174,13 +162,10 @@ export function familiesPanel(id) {
       const found = sign > 0 ? shown.findIndex(isOf) : shown.findLastIndex(isOf);
       at(found < 0 ? cursor ?? 0 : found);
     };
-    const actions = {
+    return {
       ArrowRight: () => beside(1), ArrowLeft: () => beside(-1), ArrowDown: () => at((cursor ?? -1) + by), ArrowUp: () => at((cursor ?? 1) - by),
-      Home: () => at(0), End: () => at(last), Enter: play, Escape: () => look(null),
+      Home: () => at(0), End: () => at(shown.length - 1), Enter: play, Escape: () => look(null),
     };
-    if (!actions[event.key]) return;
-    event.preventDefault();
-    actions[event.key]();
   });
   new ResizeObserver(draw).observe(stage);
 

@@ -1,9 +1,10 @@
 // The latest work of the fleet: a row for each worker, a lane for each of its slots.
 
-import { shape } from "swarm/charts.js";
-import { decimals, element } from "swarm/dom.js";
+import { shape, text } from "swarm/charts.js";
+import { decimals, element, onKeys } from "swarm/dom.js";
 import { exports } from "swarm/export.js";
 import { span } from "swarm/page.js";
+import { clamp } from "swarm/scales.js";
 
 /** Maximum number of drawn rows of workers. */
 const WORKERS_MAX = 64;
@@ -114,8 +115,6 @@ export function fleetTimeline() {
   const left = (width) => (width < 600 ? 70 : 130);
   const x = (at, width) => left(width) + ((at - window[0]) / (window[1] - window[0])) * (width - left(width) - 4);
 
-  const text = (at, y, content, more = {}) => shape("text", { x: at, y, class: "axis", ...more }, content);
-
   const draw = () => {
     const width = Math.max(260, picture.clientWidth);
     const total = AXIS + Math.max(AXIS, rows.reduce((sum, row) => sum + height(row) + GAP, 0));
@@ -199,24 +198,20 @@ export function fleetTimeline() {
   });
   picture.addEventListener("pointerleave", () => goTo(null));
   picture.addEventListener("blur", () => goTo(null));
-  picture.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || rows.length === 0) return;
+  onKeys(picture, (by) => {
+    if (rows.length === 0) return null;
     const row = cursor?.row ?? rows[0];
     const place = cursor?.it ? row.its.indexOf(cursor.it) : -1;
-    const by = event.shiftKey ? 10 : 1;
-    const go = (to) => goTo({ row, it: row.its[Math.max(0, Math.min(row.its.length - 1, to))] });
+    const go = (to) => goTo({ row, it: row.its[clamp(to, row.its.length)] });
     // Keeps the time, at another worker.
     const goToRow = (to) => {
-      const other = rows[Math.max(0, Math.min(rows.length - 1, to))];
+      const other = rows[clamp(to, rows.length)];
       const at = cursor?.it?.start ?? window[1];
       const nearest = (a, b) => (Math.abs(b.start - at) < Math.abs(a.start - at) ? b : a);
       goTo({ row: other, it: other.its.length ? other.its.reduce(nearest) : undefined });
     };
-    const actions = { ArrowRight: () => go(place + by), ArrowLeft: () => go((place < 0 ? row.its.length : place) - by), Home: () => go(0), End: () => go(row.its.length - 1),
+    return { ArrowRight: () => go(place + by), ArrowLeft: () => go((place < 0 ? row.its.length : place) - by), Home: () => go(0), End: () => go(row.its.length - 1),
       ArrowDown: () => goToRow(cursor ? rows.indexOf(row) + 1 : 0), ArrowUp: () => goToRow(rows.indexOf(row) - 1), Escape: () => goTo(null) };
-    if (!actions[event.key]) return;
-    event.preventDefault();
-    actions[event.key]();
   });
   new ResizeObserver(draw).observe(node);
   node.show = (latest, workers) => {

@@ -1,12 +1,12 @@
 // The fitness of every individual of every generation in one picture. It zooms with the curve
 // above; a click on a cell plays the individual.
 
-import { canvas, decimals, element } from "swarm/dom.js";
-import { EDGE, mapFigure, shape } from "swarm/charts.js";
+import { canvas, decimals, element, onKeys } from "swarm/dom.js";
+import { EDGE, fitnessScale, mapFigure, markCell, shape, text } from "swarm/charts.js";
 import { exports } from "swarm/export.js";
 import { FitnessPages } from "swarm/fitness-pages.js";
 import { complain, resolve } from "swarm/page.js";
-import { STOPS, rampColor, ticks } from "swarm/scales.js";
+import { clamp, rampColor, ticks } from "swarm/scales.js";
 
 /** Minimum size of a cell with lines between cells, pixels. */
 const LINES_FROM = 7;
@@ -87,21 +87,12 @@ export function heatMap(id, onZoom = () => {}) {
       }
       if (cell > LINES_FROM) for (let generation = Math.ceil(from); generation < to; generation++) context.clearRect(Math.round((generation + 0.5 - from) * cell) - 1, 0, 1, height);
       if (row > LINES_FROM) for (let place = 1; place < n_rows; place++) context.clearRect(0, Math.round(place * row) - 1, width, 1);
-      if (cursor) mark(context, (cursor.generation - 0.5 - from) * cell, cursor.place * row, Math.max(cell, 3), Math.max(row, 3));
+      if (cursor) markCell(context, (cursor.generation - 0.5 - from) * cell, cursor.place * row, cell, row);
     }
     if (held?.to !== undefined) {
       const [left, right] = [held.at, held.to].sort((a, b) => a - b);
       context.fillStyle = "rgb(128 128 128 / 40%)";
       context.fillRect(left, 0, right - left, height);
-    }
-  };
-
-  /** A frame that is visible on every colour. */
-  const mark = (context, x, y, width, height) => {
-    for (const [style, wide] of [["#000000", 4], ["#ffffff", 2]]) {
-      context.strokeStyle = style;
-      context.lineWidth = wide;
-      context.strokeRect(x, y, width, height);
     }
   };
 
@@ -113,30 +104,20 @@ export function heatMap(id, onZoom = () => {}) {
     const bottom = height - EDGE.bottom;
     const x = (generation) => EDGE.left + ((generation - from) / (to - from)) * (width - EDGE.left - EDGE.right);
     const y = (place) => EDGE.top + ((place + 0.5) / Math.max(1, pages.n_individuals)) * (bottom - EDGE.top);
-    const text = (at, content, more) => shape("text", { x: at[0], y: at[1], class: "axis", ...more }, content);
     const middle = (EDGE.top + bottom) / 2;
     const whole = (low, high, n) => ticks(low, high, n).filter(Number.isInteger);
     axes.replaceChildren(
-      ...whole(Math.max(0, from + 0.5), to - 0.5, Math.min(8, width / 90)).map((it) => text([x(it), bottom + 16], String(it), { "text-anchor": "middle" })),
-      ...whole(0, pages.n_individuals - 1, 5).map((it) => text([EDGE.left - 6, y(it) + 4], String(it), { "text-anchor": "end" })),
-      text([(EDGE.left + width - EDGE.right) / 2, height - 6], "generation", { "text-anchor": "middle" }),
-      text([14, middle], isSorted ? "rank" : "individual", { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }));
-  };
-
-  /** The legend of the colours. */
-  const drawScale = () => {
-    if (!Number.isFinite(pages.low)) return;
-    const stops = STOPS.map((color) => `rgb(${color.join(" ")})`).join(", ");
-    const ramp = element("i", { className: "ramp" });
-    ramp.style.background = `linear-gradient(to right, ${stops})`;
-    scale.replaceChildren(`fitness ≤ ${decimals(pages.low, 2)} `, ramp, ` ≥ ${decimals(pages.high, 2)}`);
+      ...whole(Math.max(0, from + 0.5), to - 0.5, Math.min(8, width / 90)).map((it) => text(x(it), bottom + 16, String(it), { "text-anchor": "middle" })),
+      ...whole(0, pages.n_individuals - 1, 5).map((it) => text(EDGE.left - 6, y(it) + 4, String(it), { "text-anchor": "end" })),
+      text((EDGE.left + width - EDGE.right) / 2, height - 6, "generation", { "text-anchor": "middle" }),
+      text(14, middle, isSorted ? "rank" : "individual", { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }));
   };
 
   const draw = () => {
     const n = pages.n_individuals;
     stage.style.height = `${Math.max(120, Math.min(360, 14 * n, Math.max(220, 3 * n))) + EDGE.top + EDGE.bottom}px`;
     drawAxes();
-    drawScale();
+    if (Number.isFinite(pages.low)) scale.replaceChildren(...fitnessScale(pages.low, pages.high));
     drawReadout();
     picture.redraw();
   };
@@ -180,7 +161,7 @@ export function heatMap(id, onZoom = () => {}) {
     const box = picture.getBoundingClientRect();
     const [from, to] = window();
     const generation = Math.round(from + ((event.clientX - box.left) / box.width) * (to - from));
-    return { x: event.clientX - box.left, width: box.width, generation: pages.nearest(Math.max(0, Math.min(n_generations - 1, generation))), place: Math.floor(((event.clientY - box.top) / box.height) * pages.n_individuals) };
+    return { x: event.clientX - box.left, width: box.width, generation: pages.nearest(clamp(generation, n_generations)), place: Math.floor(((event.clientY - box.top) / box.height) * pages.n_individuals) };
   };
   picture.addEventListener("pointerdown", (event) => {
     held = { at: at(event).x };
@@ -216,27 +197,25 @@ export function heatMap(id, onZoom = () => {}) {
     drawReadout();
     picture.redraw();
   });
-  stage.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || n_generations === 0) return;
+  onKeys(stage, (by) => {
+    if (n_generations === 0) return null;
     const [from, to] = [Math.ceil(window()[0]), Math.floor(window()[1])];
     const now = cursor ?? { generation: from, place: -1 };
-    const by = event.shiftKey ? 10 : 1;
-    const go = (generation, place) => (cursor = { generation: pages.nearest(Math.max(from, Math.min(to, generation))), place: Math.max(0, Math.min(pages.n_individuals - 1, place)) });
+    const go = (generation, place) => {
+      cursor = { generation: pages.nearest(Math.max(from, Math.min(to, generation))), place: clamp(place, pages.n_individuals) };
+      draw();
+    };
     const scaled = (factor) => {
       const half = ((to - from) * factor) / 2;
       const middle = cursor?.generation ?? (from + to) / 2;
       const next = [Math.max(0, Math.round(middle - half)), Math.min(n_generations - 1, Math.round(middle + half))];
       zoomTo(next[0] === 0 && next[1] === n_generations - 1 ? null : next);
     };
-    const actions = {
+    return {
       ArrowRight: () => go(now.generation + by, Math.max(0, now.place)), ArrowLeft: () => go(now.generation - by, Math.max(0, now.place)),
       ArrowDown: () => go(now.generation, now.place + by), ArrowUp: () => go(now.generation, now.place - by),
       Home: () => go(from, Math.max(0, now.place)), End: () => go(to, Math.max(0, now.place)), Enter: play, "+": () => scaled(0.5), "=": () => scaled(0.5), "-": () => scaled(2), Escape: () => zoomTo(null),
     };
-    if (!actions[event.key]) return;
-    event.preventDefault();
-    actions[event.key]();
-    draw();
   });
   new ResizeObserver(draw).observe(stage);
 

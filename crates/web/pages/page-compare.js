@@ -4,16 +4,16 @@ import { element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
 import { differences, statistics } from "swarm/comparison.js";
 import { allExperiments } from "swarm/experiment-list.js";
+import { COLUMN } from "swarm/generation-row.js";
 import { askJson, bar, complain, main, resolve } from "swarm/page.js";
 import { quantile, seriesStyle } from "swarm/scales.js";
 
 /** The x axes: the name of each, and its value after each generation. */
 const AXES = {
-  generation: { label: "generation", values: (rows) => rows.map((row) => row[0]) },
-  episodes: { label: "episodes", values: (rows) => sums(rows, 6) },
-  time: { label: "wall time, s", values: (rows) => sums(rows, 5).map((ms) => ms / 1000) },
+  generation: { label: "generation", values: (rows) => rows.map((row) => row[COLUMN.generation]) },
+  episodes: { label: "episodes", values: (rows) => sums(rows, COLUMN.episodes) },
+  time: { label: "wall time, s", values: (rows) => sums(rows, COLUMN.ms).map((ms) => ms / 1000) },
 };
-const COLUMNS = { best: 1, mean: 2 };
 
 function sums(rows, column) {
   let sum = 0;
@@ -28,7 +28,7 @@ let experiments = [];
 
 const select = (name, options, value) => element("select", { id: name, "aria-label": name, onchange: show }, ...options.map((option) => element("option", { value: option, selected: option === value }, option)));
 const axis = select("along", Object.keys(AXES), words.get("along") ?? "generation");
-const column = select("value", Object.keys(COLUMNS), words.get("value") ?? "mean");
+const column = select("value", ["best", "mean"], words.get("value") ?? "mean");
 const grouping = select("as", ["runs", "groups"], words.get("as") ?? "runs");
 const list = element("div", { className: "choices" });
 const picture = chart("fitness of several runs");
@@ -78,7 +78,7 @@ async function show() {
     const curves = await Promise.all(runs.map(async (it) => {
       const rows = await history(it.id);
       const along = values(rows);
-      return { it, points: rows.map((row, i) => [along[i], row[COLUMNS[column.value]]]) };
+      return { it, points: rows.map((row, i) => [along[i], row[COLUMN[column.value]]]) };
     }));
     const content = { xLabel: label, yLabel: `${column.value} fitness`, lines: [], bands: [] };
     const groups = [...Map.groupBy(runs, kind)].map(([name, its]) => ({ name, runs: its }));

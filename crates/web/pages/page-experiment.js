@@ -7,6 +7,8 @@ import { whatItDoes } from "swarm/doing.js";
 import { dynamicsPanel } from "swarm/dynamics.js";
 import { familiesPanel } from "swarm/families.js";
 import { heatMap } from "swarm/heat-map.js";
+import { frontPanel } from "swarm/front.js";
+import { COLUMN } from "swarm/generation-row.js";
 import { repertoirePanel } from "swarm/repertoire.js";
 import { askJson, bar, complain, endPage, listen, main, oneByOne, order, remaining, resolve, span, stateMark } from "swarm/page.js";
 
@@ -36,7 +38,8 @@ const map = heatMap(id, onZoom);
 const championBox = element("section", { className: "panel" });
 const dynamics = dynamicsPanel(id);
 const families = familiesPanel(id);
-const repertoire = repertoirePanel(id);
+/** The elites of a repertoire or of a front, if the algorithm evolves one. */
+let elites = null;
 const doing = element("section", { className: "panel" });
 const eventList = element("ol", { className: "events", tabIndex: 0, "aria-label": "events, the latest first" });
 const file = element("pre", { className: "file", tabIndex: 0, "aria-label": "experiment file" });
@@ -70,7 +73,7 @@ function drawStanding() {
   const isEmpty = it.generations_done === 0;
   for (const part of results) part.hidden = isEmpty;
   families.hidden = isEmpty || !hasParents;
-  repertoire.hidden = isEmpty;
+  if (elites) elites.hidden = isEmpty;
   const says = NEXT[it.state];
   standing.hidden = !says || (!isEmpty && ["running", "unfinished"].includes(it.state));
   if (standing.hidden) return;
@@ -91,20 +94,20 @@ function draw() {
     left !== null && `${span(left)} left`,
   ].filter(Boolean).join(" · ");
   drawStanding();
-  const points = (column) => generations.map((row) => [row[0], row[column]]);
+  const points = (column) => generations.map((row) => [row[COLUMN.generation], row[column]]);
   const marks = champion?.judged
     ? [{ name: "champion, 95 %", value: champion.judged[0], low: champion.judged[1], high: champion.judged[2], color: "var(--good)" }]
     : [];
   fitness.show({
     xLabel: "generation", yLabel: "fitness", marks,
-    bands: [{ color: "var(--line)", points: generations.map((row) => [row[0], row[3], row[1]]) }],
-    lines: [{ name: "best", color: "var(--relay)", points: points(1) }, { name: "mean", color: "var(--line)", points: points(2) }],
+    bands: [{ color: "var(--line)", points: generations.map((row) => [row[COLUMN.generation], row[COLUMN.min], row[COLUMN.best]]) }],
+    lines: [{ name: "best", color: "var(--relay)", points: points(COLUMN.best) }, { name: "mean", color: "var(--line)", points: points(COLUMN.mean) }],
   });
   fitness.dataset.generations = generations.length;
-  spread.show({ xLabel: "generation", yLabel: "standard deviation", lines: [{ name: "standard deviation", color: "var(--line)", points: points(4) }] });
+  spread.show({ xLabel: "generation", yLabel: "standard deviation", lines: [{ name: "standard deviation", color: "var(--line)", points: points(COLUMN.deviation) }] });
   map.update(it.generations_done);
   dynamics.update(it.generations_done);
-  if (repertoire.isConnected) repertoire.update(it.generations_done, it.state === "completed");
+  elites?.update(it.generations_done, it.state === "completed");
   families.update(it.generations_done, it.generations * it.population_size * n_populations);
 }
 
@@ -202,7 +205,10 @@ async function load() {
   ({ experiment, champion } = answer);
   n_populations = Object.keys(answer.config.algorithm?.populations ?? {}).length || 1;
   hasParents = answer.has_parents;
-  if (answer.has_repertoire && !repertoire.isConnected) results[0].after(repertoire);
+  if (!elites && (answer.has_repertoire || answer.has_front)) {
+    elites = answer.has_front ? frontPanel(id) : repertoirePanel(id);
+    results[0].after(elites);
+  }
   const text = JSON.stringify(answer.config, null, 2);
   if (file.textContent !== text) file.textContent = text;
   draw();
@@ -244,7 +250,7 @@ async function start() {
   if (isOver) return;
   stopListening = listen(`/api/experiments/${id}/live?from=0`, (news) => {
     // After a new connection the server may repeat known generations.
-    for (const row of news.generations) if (row[0] === generations.length + (generations[0]?.[0] ?? row[0])) generations.push(row);
+    for (const row of news.generations) if (row[COLUMN.generation] === generations.length + (generations[0]?.[COLUMN.generation] ?? row[COLUMN.generation])) generations.push(row);
     const before = experiment;
     experiment = news.experiment;
     draw();

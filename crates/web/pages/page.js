@@ -2,6 +2,7 @@
 // and news.
 
 import { element } from "swarm/dom.js";
+import { COLUMN } from "swarm/generation-row.js";
 
 /** The place for the content of a page. */
 export const main = document.getElementById("page");
@@ -13,7 +14,7 @@ export function bar(title, current) {
   const status = element("span", { id: "connection", className: "muted" });
   document.body.prepend(element("nav", {},
     element("a", { href: "/", className: "name" }, "swarmevo"),
-    link("/", "Experiments"), link("/compare", "Compare"), link("/fleet", "Fleet"), link("/verify", "Verify"),
+    link("/", "Experiments"), link("/compare", "Compare"), link("/fleet", "Fleet"), link("/verify", "Verify"), link("/demo", "Demo"),
     element("span", { className: "space" }), status));
 }
 
@@ -50,8 +51,38 @@ export async function order(path, body = {}) {
   return ask(path, { method: "POST", headers, body: JSON.stringify(body) });
 }
 
-/** Time until the page retries a connection that the browser has given up, ms. */
-const AGAIN_AFTER = 2000;
+/** Time between two requests of `askDuringRun`, ms: the server repeats generations for each. */
+const ASK_EVERY = 5000;
+
+/** Requests what `details` show while they are open, and again as evolution goes on. `take(answer)`
+ *  draws it; `note`: the place for errors; `isDone()`: false if the answer lacks what the end of a
+ *  run adds. The details get `update(n_generations, isOver)`: the number of generations, and whether
+ *  no more follow. */
+export function askDuringRun(details, path, { take, note, isDone }) {
+  let n_generations = 0;
+  let isAsking = false;
+  let askedAt = -Infinity;
+  const request = async () => {
+    if (!details.open || details.hidden || isAsking || n_generations === 0) return;
+    isAsking = true;
+    askedAt = performance.now();
+    try {
+      take(await askJson(path));
+    } catch (error) {
+      note.textContent = error.message;
+    }
+    isAsking = false;
+  };
+  details.ontoggle = request;
+  details.update = (n, isOver) => {
+    const isNew = n !== n_generations || (isOver && !isDone());
+    n_generations = n;
+    if (isNew && (isOver || performance.now() - askedAt > ASK_EVERY)) request();
+  };
+}
+
+/** Time until the page retries a failed request, or a connection that the browser gave up, ms. */
+export const AGAIN_AFTER = 2000;
 
 /** News from the server; the browser reconnects by itself, and sends the id of its last event.
  *  `onEnd(refusal)`: the server refuses to send more. */
@@ -161,7 +192,7 @@ export function span(ms) {
 
 /** Milliseconds until an experiment has all its generations, at its latest pace. */
 export function remaining(experiment, generations) {
-  const durations = generations.slice(-20).map((row) => row[5]);
+  const durations = generations.slice(-20).map((row) => row[COLUMN.ms]);
   if (experiment.state !== "running" || durations.length === 0) return null;
   const mean = durations.reduce((sum, ms) => sum + ms, 0) / durations.length;
   return mean * (experiment.generations - experiment.generations_done);

@@ -1,9 +1,10 @@
 // Plays an episode: the world, its controls, the followed robot, the timeline.
 
-import { Clock, clamp } from "swarm/clock.js";
+import { Clock } from "swarm/clock.js";
 import { decimals, element } from "swarm/dom.js";
 import { recordButton } from "swarm/recording.js";
 import { robotPanel } from "swarm/robot-panel.js";
+import { clamp } from "swarm/scales.js";
 import { timeline } from "swarm/timeline.js";
 import { worthOf } from "swarm/trials.js";
 import { World } from "swarm/world.js";
@@ -23,9 +24,11 @@ document.addEventListener("keydown", (event) => {
 
 export class Player {
   /** `place`: the store of step and robot, such as the page's address. `clock`: the clock of the
-   *  player beside this one. `suffix`: distinguishes its ids from those of the other player. */
-  constructor(episode, { place = addressPlace(), clock = null, suffix = "" } = {}) {
+   *  player beside this one. `suffix`: distinguishes its ids from those of the other player.
+   *  `chosen(robot)`: hears of the followed robot. */
+  constructor(episode, { place = addressPlace(), clock = null, suffix = "", chosen = () => {} } = {}) {
     this.episode = episode;
+    this.chosen = chosen;
     this.place = place;
     this.suffix = suffix;
     const { step = 0, robot = null } = place.read();
@@ -52,8 +55,10 @@ export class Player {
     const choose = (robot) => this.choose(robot);
     const id = (name) => (name ? name + suffix : "");
     this.world = new World(episode, view, choose);
-    this.panel = robotPanel(episode, view, seek, choose, id);
-    this.timeline = timeline(episode, view, seek);
+    // Two players have parts of different names.
+    const label = (name) => (suffix ? `${name}, changed` : name);
+    this.panel = robotPanel(episode, view, seek, choose, id, label("the followed robot"));
+    this.timeline = timeline(episode, view, seek, label("over all steps"));
     const button = (text, title, onclick, name = "") => element("button", { type: "button", title, onclick, id: id(name), className: name, "aria-label": title }, text);
     this.playButton = button("▶", "play (Space)", () => clock.toggle(), "play");
     this.slider = element("input", {
@@ -87,7 +92,7 @@ export class Player {
       this.recordButton,
       element("span", { className: "space" }),
       this.legend(), this.help());
-    this.node = element("div", { className: "player", tabIndex: 0, role: "group", "aria-label": episode.name },
+    this.node = element("div", { className: "player", tabIndex: 0, role: "group", "aria-label": label(episode.name) },
       element("div", { className: "stage" }, this.world.node, controls, options), this.panel.node, this.timeline.node);
     for (const kind of ["pointerdown", "focusin"]) this.node.addEventListener(kind, () => (active = this));
   }
@@ -151,6 +156,7 @@ export class Player {
 
   choose(robot) {
     this.view.robot = robot;
+    this.chosen(robot);
     this.remember();
     this.redraw();
   }
@@ -241,13 +247,15 @@ export function readAddress() {
   return { step: number("step"), robot: number("robot") };
 }
 
-/** Remembers step and robot after the # of the address. */
+/** Remembers step and robot after the # of the address, and leaves other words there alone. */
 function addressPlace() {
   let written = location.hash;
   return {
     read: readAddress,
     write({ step, robot }) {
-      const words = new URLSearchParams({ step });
+      const words = new URLSearchParams(location.hash.slice(1));
+      words.set("step", step);
+      words.delete("robot");
       if (robot !== null) words.set("robot", robot);
       // Browsers limit the number of changes of an address per second.
       if (`#${words}` === written) return;

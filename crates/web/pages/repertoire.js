@@ -1,27 +1,21 @@
 // The repertoire of an experiment: the fittest elite of every cell of behaviours. A click on a cell
 // plays its elite.
 
-import { canvas, decimals, element } from "swarm/dom.js";
-import { EDGE, mapFigure, shape } from "swarm/charts.js";
+import { canvas, decimals, element, onKeys } from "swarm/dom.js";
+import { EDGE, fitnessScale, mapFigure, markCell, shape, text } from "swarm/charts.js";
 import { exports } from "swarm/export.js";
-import { askJson } from "swarm/page.js";
-import { STOPS, extremes, rampColor, ticks } from "swarm/scales.js";
+import { askDuringRun } from "swarm/page.js";
+import { clamp, extremes, rampColor, ticks } from "swarm/scales.js";
 
 /** Minimum size of a cell with lines between cells, pixels. */
 const LINES_FROM = 7;
-/** Time between two requests while evolution goes on, ms: the server repeats generations. */
-const ASK_EVERY = 5000;
 
-/** A part of the page; `update(n_generations, isOver)`: the number of generations, and whether no
- *  more follow. */
+/** A part of the page, with the `update` of `askDuringRun`. */
 export function repertoirePanel(id) {
   let found = null;
   /** Elites by their cells on the first two axes. */
   let elites = new Map();
   let range = [0, 1];
-  let n_generations = 0;
-  let isAsking = false;
-  let askedAt = -Infinity;
   /** The cell of the readout. */
   let cursor = null;
 
@@ -32,7 +26,7 @@ export function repertoirePanel(id) {
   const axes = shape("svg", { "aria-hidden": "true" });
   const stage = element("div", { className: "cells", tabIndex: 0, role: "group", "aria-roledescription": "heat map", "aria-label": "fitness of the elite of every cell of behaviours; arrow keys go through the cells, Enter plays an elite" }, axes, picture);
   const files = exports({ svg: () => mapFigure(stage, axes, picture), table: () => table(), name: () => `repertoire-${id}` });
-  const node = element("details", { className: "panel repertoire", hidden: true, open: true, ontoggle: () => ask() },
+  const node = element("details", { className: "panel repertoire", hidden: true, open: true },
     element("summary", {}, "Repertoire"),
     element("header", {}, element("span", { className: "muted" }, "click a cell to play its elite"), element("span", { className: "space" }), scale),
     note, stage, element("p", { className: "row small" }, readout, files));
@@ -52,12 +46,7 @@ export function repertoirePanel(id) {
       context.fillStyle = `rgb(${rampColor((fitness - range[0]) / (range[1] - range[0] || 1)).join(" ")})`;
       context.fillRect(i * wide, height - (j + 1) * high, Math.max(wide - gap, 1), Math.max(high - gap, 1));
     }
-    if (!cursor) return;
-    for (const [style, line] of [["#000000", 4], ["#ffffff", 2]]) {
-      context.strokeStyle = style;
-      context.lineWidth = line;
-      context.strokeRect(cursor[0] * wide, height - (cursor[1] + 1) * high, Math.max(wide, 3), Math.max(high, 3));
-    }
+    if (cursor) markCell(context, cursor[0] * wide, height - (cursor[1] + 1) * high, wide, high);
   };
 
   const drawAxes = () => {
@@ -67,26 +56,23 @@ export function repertoirePanel(id) {
     const bottom = height - EDGE.bottom;
     const [along, up] = found.axes;
     const share = ({ low, high }, value) => (value - low) / (high - low);
-    const text = (place, content, more) => shape("text", { x: place[0], y: place[1], class: "axis", ...more }, content);
     const name = ({ measure, of }) => `${measure} (${of})`;
     const middle = (EDGE.top + bottom) / 2;
     const label = (value) => String(Number(value.toPrecision(6)));
     const nodes = ticks(along.low, along.high, Math.min(8, width / 90)).map((value) =>
-      text([EDGE.left + share(along, value) * (width - EDGE.left - EDGE.right), bottom + 16], label(value), { "text-anchor": "middle" }));
-    nodes.push(text([(EDGE.left + width - EDGE.right) / 2, height - 6], name(along), { "text-anchor": "middle" }));
+      text(EDGE.left + share(along, value) * (width - EDGE.left - EDGE.right), bottom + 16, label(value), { "text-anchor": "middle" }));
+    nodes.push(text((EDGE.left + width - EDGE.right) / 2, height - 6, name(along), { "text-anchor": "middle" }));
     if (up) {
       nodes.push(...ticks(up.low, up.high, 5).map((value) =>
-        text([EDGE.left - 6, bottom - share(up, value) * (bottom - EDGE.top) + 4], label(value), { "text-anchor": "end" })));
-      nodes.push(text([14, middle], name(up), { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }));
+        text(EDGE.left - 6, bottom - share(up, value) * (bottom - EDGE.top) + 4, label(value), { "text-anchor": "end" })));
+      nodes.push(text(14, middle, name(up), { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }));
     }
     axes.replaceChildren(...nodes);
   };
 
   const draw = () => {
     if (!found) return;
-    const ramp = element("i", { className: "ramp" });
-    ramp.style.background = `linear-gradient(to right, ${STOPS.map((color) => `rgb(${color.join(" ")})`).join(", ")})`;
-    if (elites.size) scale.replaceChildren(`fitness ≤ ${decimals(range[0], 2)} `, ramp, ` ≥ ${decimals(range[1], 2)}`);
+    if (elites.size) scale.replaceChildren(...fitnessScale(...range));
     const { corrected, generation, n_elites } = found;
     note.textContent = corrected
       ? `judged on new trials: QD score ${decimals(corrected.qd_score, 3)}, coverage ${decimals(100 * corrected.coverage, 0)} %, ${decimals(100 * corrected.stay, 0)} % of ${n_elites} elites stay in their cell`
@@ -110,32 +96,24 @@ export function repertoirePanel(id) {
     if (it) location.assign(`/replay/${id}@${it.generation}/${it.individual}`);
   };
 
-  const ask = async () => {
-    if (!node.open || node.hidden || isAsking || n_generations === 0) return;
-    isAsking = true;
-    askedAt = performance.now();
-    try {
-      found = await askJson(`/api/experiments/${id}/repertoire`);
-      elites = new Map();
-      for (const [cell, fitness, descriptors, generation, individual] of found.shown) {
-        const place = [cell[0], cell[1] ?? 0];
-        const before = elites.get(key(...place));
-        // With more than two descriptors, several elites share a cell of the picture.
-        if (!before || before.fitness < fitness) elites.set(key(...place), { cell: place, fitness, descriptors, generation, individual });
-      }
-      range = extremes([...elites.values()].map((it) => it.fitness));
-      draw();
-    } catch (error) {
-      note.textContent = error.message;
+  const take = (answer) => {
+    found = answer;
+    elites = new Map();
+    for (const [cell, fitness, descriptors, generation, individual] of found.shown) {
+      const place = [cell[0], cell[1] ?? 0];
+      const before = elites.get(key(...place));
+      // With more than two descriptors, several elites share a cell of the picture.
+      if (!before || before.fitness < fitness) elites.set(key(...place), { cell: place, fitness, descriptors, generation, individual });
     }
-    isAsking = false;
+    range = extremes([...elites.values()].map((it) => it.fitness));
+    draw();
   };
 
   /** The cell at a place of the picture. */
   const under = (event) => {
     const box = picture.getBoundingClientRect();
     const [n_columns, n_rows] = size();
-    const within = (value, n) => Math.max(0, Math.min(n - 1, Math.floor(value * n)));
+    const within = (value, n) => clamp(Math.floor(value * n), n);
     return [within((event.clientX - box.left) / box.width, n_columns), within((box.bottom - event.clientY) / box.height, n_rows)];
   };
   const point = (cell) => {
@@ -150,19 +128,15 @@ export function repertoirePanel(id) {
     point(under(event));
     play();
   });
-  stage.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || !found) return;
+  onKeys(stage, (by) => {
+    if (!found) return null;
     const [n_columns, n_rows] = size();
     const [i, j] = cursor ?? [0, 0];
-    const by = event.shiftKey ? 10 : 1;
-    const go = (column, row) => point([Math.max(0, Math.min(n_columns - 1, column)), Math.max(0, Math.min(n_rows - 1, row))]);
-    const actions = {
+    const go = (column, row) => point([clamp(column, n_columns), clamp(row, n_rows)]);
+    return {
       ArrowRight: () => go(cursor ? i + by : 0, j), ArrowLeft: () => go(i - by, j), ArrowUp: () => go(i, j + by), ArrowDown: () => go(i, j - by),
       Home: () => go(0, j), End: () => go(n_columns - 1, j), PageUp: () => go(i, n_rows - 1), PageDown: () => go(i, 0), Enter: play,
     };
-    if (!actions[event.key]) return;
-    event.preventDefault();
-    actions[event.key]();
   });
   new ResizeObserver(draw).observe(stage);
 
@@ -172,10 +146,6 @@ export function repertoirePanel(id) {
     ...found.shown.map(([, fitness, descriptors, generation, individual]) => [`${id}@${generation}/${individual}`, fitness, ...descriptors]),
   ];
 
-  node.update = (n, isOver) => {
-    const isNew = n !== n_generations || (isOver && found && !found.corrected);
-    n_generations = n;
-    if (isNew && (isOver || performance.now() - askedAt > ASK_EVERY)) ask();
-  };
+  askDuringRun(node, `/api/experiments/${id}/repertoire`, { take, note, isDone: () => !found || found.corrected });
   return node;
 }

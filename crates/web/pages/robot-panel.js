@@ -7,9 +7,9 @@ import { track } from "swarm/timeline.js";
 /** Height of a row of a map, pixels. */
 const ROW = 9;
 
-/** `id`: makes the ids of its parts from their names. */
-export function robotPanel(episode, view, seek, choose, id) {
-  const node = element("aside", { className: "robot-panel", "aria-label": "the followed robot" });
+/** `id`: makes the ids of its parts from their names; `label`: its name for screen readers. */
+export function robotPanel(episode, view, seek, choose, id, label) {
+  const node = element("aside", { className: "robot-panel", "aria-label": label });
   let shown = undefined;
   let parts = [];
 

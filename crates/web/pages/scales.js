@@ -5,6 +5,11 @@ export function extremes(values) {
   return values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
 }
 
+/** A whole number from 0 to n - 1. */
+export function clamp(value, n) {
+  return Math.max(0, Math.min(n - 1, value));
+}
+
 /** Round numbers within a range, about `n` of them. */
 export function ticks(low, high, n) {
   const raw = (high - low) / n || 1;

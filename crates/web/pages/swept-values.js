@@ -1,9 +1,9 @@
 // The dependence of champions' worth on the swept values in the files of runs.
 
-import { shape } from "swarm/charts.js";
-import { decimals, element, onTheme } from "swarm/dom.js";
+import { shape, text } from "swarm/charts.js";
+import { decimals, element, onKeys, onTheme } from "swarm/dom.js";
 import { exports } from "swarm/export.js";
-import { extremes, rampColor, ticks } from "swarm/scales.js";
+import { clamp, extremes, rampColor, ticks } from "swarm/scales.js";
 
 /** Minimum number of runs for a statement about a key. */
 const RUNS_MIN = 6;
@@ -18,7 +18,6 @@ const LETTER = 7;
 const SEEN = { light: [0, 0.85], dark: [0.35, 1] };
 
 const isDark = matchMedia("(prefers-color-scheme: dark)");
-const text = (x, y, content, more = {}) => shape("text", { x, y, class: "axis", ...more }, content);
 
 /** Colour of a share from 0 to 1, on the ground of this theme. */
 function colorOf(share) {
@@ -125,7 +124,7 @@ function parallel(runs, swept) {
     readout.textContent = it ? `${it.id} ${it.name}, seed ${it.seed}: worth ${decimals(it.champion, 4)}; ${swept.map(({ title, values }) => `${title} ${values[cursor]}`).join(", ")}` : "";
   };
   const goTo = (i) => {
-    cursor = i === null ? null : Math.max(0, Math.min(runs.length - 1, i));
+    cursor = i === null ? null : clamp(i, runs.length);
     mark();
   };
   svg.addEventListener("pointermove", ({ target }) => {
@@ -133,15 +132,11 @@ function parallel(runs, swept) {
     if (i >= 0) goTo(i);
   });
   svg.addEventListener("pointerleave", () => goTo(null));
-  svg.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
+  onKeys(svg, () => {
     const up = () => goTo(cursor === null ? 0 : cursor + 1);
     const down = () => goTo(cursor === null ? runs.length - 1 : cursor - 1);
-    const actions = { ArrowRight: up, ArrowUp: up, ArrowLeft: down, ArrowDown: down, Home: () => goTo(0), End: () => goTo(runs.length - 1), Escape: () => goTo(null),
+    return { ArrowRight: up, ArrowUp: up, ArrowLeft: down, ArrowDown: down, Home: () => goTo(0), End: () => goTo(runs.length - 1), Escape: () => goTo(null),
       Enter: () => cursor !== null && location.assign(`/experiment/${runs[cursor].id}`) };
-    if (!actions[event.key]) return;
-    event.preventDefault();
-    actions[event.key]();
   });
   new ResizeObserver(draw).observe(node);
   onTheme(draw);

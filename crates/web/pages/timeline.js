@@ -62,8 +62,8 @@ function curve(values, view, seek, label) {
 }
 
 /** All tracks of an episode; `redraw` marks the current step. */
-export function timeline(episode, view, seek) {
-  const node = element("section", { className: "timeline", "aria-label": "over all steps" });
+export function timeline(episode, view, seek, label) {
+  const node = element("section", { className: "timeline", "aria-label": label });
   const tracks = [];
   const values = [];
   const add = (title, track, valueAt, help = "") => {

@@ -3,6 +3,7 @@
 import { decimals, element } from "swarm/dom.js";
 import { shape } from "swarm/charts.js";
 import { exports } from "swarm/export.js";
+import { clamp } from "swarm/scales.js";
 
 /** Height of the strip, and room around its bars, pixels. */
 const [HEIGHT, EDGE] = [64, 3];
@@ -34,7 +35,7 @@ export function trialStrip(trials, shown, pick = null) {
   };
   const placeOf = (event) => {
     const box = svg.getBoundingClientRect();
-    return Math.max(0, Math.min(n - 1, Math.floor(((event.clientX - box.left) / box.width) * n)));
+    return clamp(Math.floor(((event.clientX - box.left) / box.width) * n), n);
   };
   svg.addEventListener("pointermove", (event) => mark(placeOf(event)));
   if (pick) {
@@ -46,7 +47,7 @@ export function trialStrip(trials, shown, pick = null) {
       const to = { ArrowLeft: at - 1, ArrowRight: at + 1, Home: 0, End: n - 1 }[event.key];
       if (event.key === "Enter") pick(order[at]);
       else if (to === undefined) return;
-      else at = Math.max(0, Math.min(n - 1, to));
+      else at = clamp(to, n);
       // The player uses the same keys for steps.
       event.preventDefault();
       event.stopPropagation();

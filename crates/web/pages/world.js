@@ -23,6 +23,10 @@ export class World {
     this.node.className = "world";
     // The canvas is opaque, so the browser need not blend it.
     this.node.getContext("2d", { alpha: false });
+    /** Takes a thing and its new place, while the user may drag things. */
+    this.hand = null;
+    /** The dragged thing, and the pixel where it is. */
+    this.carried = null;
     this.listen(onRobot);
   }
 
@@ -41,12 +45,23 @@ export class World {
       return { x: (ax + bx) / 2, y: (ay + by) / 2, apart: Math.max(1, Math.hypot(ax - bx, ay - by)) };
     };
     node.addEventListener("pointerdown", (event) => {
+      const thing = this.hand && this.thingAt(...place(event));
+      if (thing) {
+        this.carried = { ...thing, at: place(event) };
+        node.setPointerCapture(event.pointerId);
+        return node.redraw();
+      }
       fingers.set(event.pointerId, place(event));
       held = { at: place(event), moved: fingers.size > 1 };
       // A single finger scrolls the page, as anywhere else.
       if (event.pointerType !== "touch") node.setPointerCapture(event.pointerId);
     });
     node.addEventListener("pointermove", (event) => {
+      if (this.carried) {
+        this.carried.at = place(event);
+        return node.redraw();
+      }
+      if (this.hand) node.style.cursor = this.thingAt(...place(event)) ? "grab" : "";
       if (!held || !fingers.has(event.pointerId)) return;
       if (fingers.size === 2) {
         const before = pinch();
@@ -65,12 +80,14 @@ export class World {
       node.redraw();
     });
     node.addEventListener("pointerup", (event) => {
+      if (this.carried) return this.drop(place(event));
       if (held && !held.moved) onRobot(this.robotAt(...place(event)));
       fingers.delete(event.pointerId);
       if (fingers.size === 0) held = null;
     });
     for (const kind of ["pointercancel", "lostpointercapture"]) {
       node.addEventListener(kind, (event) => {
+        if (this.carried && kind === "pointercancel") this.drop(null);
         fingers.delete(event.pointerId);
         if (fingers.size === 0) held = null;
       });
@@ -80,6 +97,44 @@ export class World {
       camera.zoomAt(...place(event), Math.exp(-event.deltaY * 0.0015));
       node.redraw();
     }, { passive: false });
+  }
+
+  /** Lets the user drag robots and things: calls `hand` with the thing and its new place. Null: no
+   *  more. */
+  carry(hand) {
+    this.hand = hand;
+    this.carried = null;
+    this.node.classList.toggle("carries", hand !== null);
+    this.node.style.cursor = "";
+    this.node.redraw();
+  }
+
+  /** Ends the dragging of a thing at a pixel; null: where it was. */
+  drop(at) {
+    const { kind, number } = this.carried;
+    this.carried = null;
+    this.node.redraw();
+    if (at === null) return;
+    const { room, width, height } = this.episode;
+    const within = (value, size) => Math.round(10 * (room ? Math.max(0, Math.min(size, value)) : ((value % size) + size) % size)) / 10;
+    const [x, y] = this.camera.toWorld(...at);
+    this.hand({ kind, number }, { x: within(x, width), y: within(y, height) });
+  }
+
+  /** The nearest thing at a pixel that can be dragged; null without one. */
+  thingAt(px, py) {
+    const { camera, episode, view } = this;
+    let [nearest, distance] = [null, 24];
+    for (const kind of ["area", "light", "movable", "robot"]) {
+      for (let number = 0; number < episode.countOf(kind); number++) {
+        const [x, y] = episode.placeOf(kind, number, view.step);
+        camera.eachImage(x, y, 30, (sx, sy) => {
+          const d = Math.hypot(sx - px, sy - py);
+          if (d <= distance) [nearest, distance] = [{ kind, number }, d];
+        });
+      }
+    }
+    return nearest;
   }
 
   /** The robot at a pixel; null without one. */
@@ -122,8 +177,24 @@ export class World {
     if (view.radio) drawHearing(context, this);
     this.robots.draw(context, this);
     if (episode.room) drawTouches(context, this);
+    if (this.carried) this.drawCarried(context);
     context.restore();
-    this.drawRuler(context);
+    this.drawScaleBar(context);
+  }
+
+  /** A ring at the pointer, and the way from where the thing is. */
+  drawCarried(context) {
+    const { camera, carried, colors, episode, view } = this;
+    const from = camera.toScreen(...episode.placeOf(carried.kind, carried.number, view.step));
+    context.strokeStyle = colors.relay;
+    context.lineWidth = 2;
+    context.setLineDash([4, 4]);
+    context.beginPath();
+    context.moveTo(...from);
+    context.lineTo(...carried.at);
+    context.stroke();
+    context.setLineDash([]);
+    disc(context, ...carried.at, 12).stroke();
   }
 
   /** A grid of a metre, and the seam where the torus closes. */
@@ -232,8 +303,8 @@ export class World {
     return Math.max(RADIUS_MIN, Math.min(RADIUS * this.camera.scale, 26));
   }
 
-  /** A length to compare with. */
-  drawRuler(context) {
+  /** A scale bar. */
+  drawScaleBar(context) {
     const { camera, colors } = this;
     const length = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000].find((cm) => cm * camera.scale > 50) ?? 10000;
     const y = camera.height - 14;

@@ -20,7 +20,6 @@ import urllib.request
 
 from harness import CLIENT_TOKEN, CONFIG, DEADLINE, NARROW, PROGRAMS, WORKER_TOKEN, BrowserTest, Fleet
 
-from axe_core_python.selenium import Axe
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -33,10 +32,7 @@ class Pages(BrowserTest):
 
     @classmethod
     def setUpClass(cls):
-        cls.fleet = Fleet()
-        cls.addClassCleanup(cls.fleet.stop)
-        cls.fleet.start_worker()
-        cls.fleet.swarmctl("submit", str(CONFIG), "--generations", "12", "--watch")
+        cls.start_fleet(generations=12)
 
     def open(self, path):
         self.browser.get(self.fleet.pages + path)
@@ -173,7 +169,6 @@ class Pages(BrowserTest):
         self.picture("fleet")
 
     def test_pages_keep_the_rules_of_accessibility(self):
-        self.browser.set_script_timeout(DEADLINE)
         for narrow in [False, True]:
             if narrow:
                 self.narrow()
@@ -181,9 +176,7 @@ class Pages(BrowserTest):
             for path, ready in [("/", "tr[data-id='1']"), ("/experiment/1", ".heat-map .ramp"), ("/compare?as=groups", ".differences"), ("/fleet", "tr[data-id]"), ("/replay/1#step=5&robot=1", ".strip"), ("/login", "#token")]:
                 self.open(path)
                 self.find(ready)
-                self.script("document.querySelectorAll('details').forEach((it) => (it.open = true))")
-                found = [(it["id"], [node["target"] for node in it["nodes"]]) for it in Axe().run(self.browser)["violations"]]
-                self.assertEqual(found, [], f"{path}{', narrow' if narrow else ''}")
+                self.assert_accessible(f"{path}{', narrow' if narrow else ''}")
 
     def test_a_narrow_screen_has_room_and_both_themes_differ(self):
         self.narrow()

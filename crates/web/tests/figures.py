@@ -23,10 +23,7 @@ N_GENERATIONS, N_INDIVIDUALS = 12, 32
 class Figures(BrowserTest):
     @classmethod
     def setUpClass(cls):
-        cls.fleet = Fleet()
-        cls.addClassCleanup(cls.fleet.stop)
-        cls.fleet.start_worker()
-        cls.fleet.swarmctl("submit", str(CONFIG), "--generations", str(N_GENERATIONS), "--watch")
+        cls.start_fleet(generations=N_GENERATIONS)
 
     def open(self, path):
         self.browser.get(self.fleet.pages + path)
@@ -183,6 +180,50 @@ class Figures(BrowserTest):
         self.wait_for_text(".repertoire .readout", f"cell {across}, {up}: ")
         self.assertIn(f"individual {individual} of generation {generation}", self.text(".repertoire .readout"))
         self.press(".repertoire .cells", Keys.ENTER)
+        self.wait(lambda: f"/replay/{run}@{place}" in self.browser.current_url, "it does not play")
+        for narrow in [False, True]:
+            if narrow:
+                self.narrow()
+                self.prefer("dark")
+            self.open(f"/experiment/{run}")
+            self.find(f"details.repertoire[data-cells='{len(shown)}']")
+            self.assert_accessible(f"a repertoire{', narrow' if narrow else ''}")
+            if narrow:
+                self.assertLessEqual(self.width(), NARROW, "it is too wide")
+
+    def test_points_of_a_front_are_judged_and_play(self):
+        config = json.loads(CONFIG.read_text())
+        config["algorithm"] |= {"name": "NSGA-II", "judgement_trials": 3, "aims": [
+            {"measure": "leaders", "direction": "minimise"},
+        ]}
+        config["algorithm"]["populations"]["network"]["params"] = {}
+        file = pathlib.Path(self.fleet.directory.name) / "front.json"
+        file.write_text(json.dumps(config))
+        self.fleet.swarmctl("submit", str(file), "--generations", "6", "--watch")
+        run = max(it["id"] for it in json.loads(self.fleet.swarmctl("list")))
+        told = json.loads(self.fleet.swarmctl("front", str(run)))
+        shown = sorted((it for it in told["elites"] if it["shown"]), key=lambda it: it["judged"]["aims"]["leaders_mean"])
+        self.open(f"/experiment/{run}")
+        panel = self.find("details.front")
+        self.wait(lambda: panel.get_attribute("data-points") == str(len(shown)), "points are missing")
+        self.wait_for_text(".front p:nth-of-type(2)", f"hypervolume {told['figures']['hypervolume']:.4f}".replace("-", "−"))
+        for label in ["leaders (mean), minimise", "fitness"]:
+            self.assertIn(label, self.text(".front .cells svg"))
+        rows = list(csv.DictReader(io.StringIO(self.saved(".front .save:last-child"))))
+        self.assertEqual({it["address"]: float(it["fitness"]) for it in rows}, {it["address"]: it["judged"]["fitness"] for it in shown})
+        self.script("document.querySelector('.front').scrollIntoView()")
+        self.picture("front")
+        for width in [390, 2560]:
+            self.browser.set_window_size(width, 900)
+            self.wait(lambda: self.width() <= self.script("return innerWidth"), "the page is wider than the window")
+            self.press(".front .cells", Keys.END)
+            self.script("document.querySelector('.front').scrollIntoView()")
+            self.picture(f"front-{width}")
+        self.press(".front .cells", Keys.HOME)
+        _, place = shown[0]["address"].split("@")
+        generation, individual = place.split("/")
+        self.wait_for_text(".front .readout", f"individual {individual} of generation {generation}")
+        self.press(".front .cells", Keys.ENTER)
         self.wait(lambda: f"/replay/{run}@{place}" in self.browser.current_url, "it does not play")
 
     def test_a_click_on_a_child_plays_it(self):

@@ -29,6 +29,7 @@ if not (CHROMIUM and DRIVER):
     )
     sys.exit(0)
 
+from axe_core_python.selenium import Axe
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
@@ -43,6 +44,20 @@ def free_port():
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         return listener.getsockname()[1]
+
+
+def swarmctl(*args):
+    return subprocess.run([PROGRAMS / "swarmctl", *map(str, args)], text=True, capture_output=True)
+
+
+def with_simulator(*args):
+    """The output of a command that makes a page with the simulator for browsers."""
+    made = swarmctl(*args)
+    if "without the simulator" in made.stderr:
+        print("SKIPPED: the programs have no simulator for browsers; dist/build simulator makes it")
+        sys.exit(0)
+    assert made.returncode == 0, made.stderr
+    return made.stdout.strip()
 
 
 class Fleet:
@@ -105,6 +120,15 @@ class BrowserTest(unittest.TestCase):
     # Errors that a test provokes on purpose, such as a refused login.
     expected_complaints = ()
 
+    @classmethod
+    def start_fleet(cls, generations=0):
+        """A fleet for all tests of the class, with some generations of the quickstart."""
+        cls.fleet = Fleet()
+        cls.addClassCleanup(cls.fleet.stop)
+        if generations:
+            cls.fleet.start_worker()
+            cls.fleet.swarmctl("submit", str(CONFIG), "--generations", str(generations), "--watch")
+
     def setUp(self):
         options = webdriver.ChromeOptions()
         options.binary_location = CHROMIUM
@@ -138,6 +162,13 @@ class BrowserTest(unittest.TestCase):
         size = {"width": NARROW, "height": 844, "deviceScaleFactor": 1, "mobile": True}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
+    def assert_accessible(self, what):
+        """The page with everything open keeps the rules of accessibility."""
+        self.browser.set_script_timeout(DEADLINE)
+        self.script("document.querySelectorAll('details').forEach((it) => (it.open = true))")
+        found = [(it["id"], [node["target"] for node in it["nodes"]]) for it in Axe().run(self.browser)["violations"]]
+        self.assertEqual(found, [], what)
+
     def width(self):
         """The width of the whole page: a phone shrinks a page that is too wide, and so widens its
         window."""
@@ -156,6 +187,9 @@ class BrowserTest(unittest.TestCase):
         """The visible text of an element that the page may replace at any moment."""
         self.find(selector)
         return self.script(f"const it = document.querySelector({selector!r}); return it?.innerText ?? it?.textContent ?? ''")
+
+    def texts(self, selector):
+        return self.script(f"return [...document.querySelectorAll('{selector}')].map((it) => it.textContent)")
 
     def wait_for_text(self, selector, part):
         self.wait(lambda: part in self.script(f"return document.querySelector({selector!r})?.textContent ?? ''"), f"{selector} never says {part!r}")

@@ -9,7 +9,7 @@ import unittest
 import urllib.parse
 import urllib.request
 
-from harness import CONFIG, DEADLINE, NARROW, BrowserTest, Fleet
+from harness import CONFIG, DEADLINE, NARROW, BrowserTest
 
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
@@ -24,8 +24,7 @@ class Lists(BrowserTest):
 
     @classmethod
     def setUpClass(cls):
-        cls.fleet = Fleet()
-        cls.addClassCleanup(cls.fleet.stop)
+        cls.start_fleet()
         submit = lambda *args: cls.fleet.swarmctl("submit", str(CONFIG), *args)
         submit("--seeds", f"0..{N_JUDGED - 1}", "--generations", "1", "--group", "judged")
         submit("--seeds", f"0..{N_STILL - 1}", "--group", "still")
@@ -43,9 +42,6 @@ class Lists(BrowserTest):
 
     def ids(self):
         return self.script("return [...document.querySelectorAll('tbody tr[data-id]')].map((it) => Number(it.dataset.id))")
-
-    def texts(self, selector):
-        return self.script(f"return [...document.querySelectorAll('{selector}')].map((it) => it.textContent)")
 
     def asked(self, path, **headers):
         request = urllib.request.Request(self.fleet.pages + path, headers=headers)

@@ -5,22 +5,16 @@ Skips if the programs were compiled without the simulator for browsers.
 
 import hashlib
 import pathlib
-import subprocess
-import sys
 import tempfile
 import unittest
 import zipfile
 
-from harness import CONFIG, NARROW, PROGRAMS, BrowserTest, Fleet
+from harness import CONFIG, NARROW, BrowserTest, swarmctl, with_simulator
 
 from selenium.webdriver.common.by import By
 
 BUNDLES = pathlib.Path(__file__).parents[3] / "results/bundles"
 QUICKSTART = "c11a2917b82381af1a41371a42c3911ac5021fcc9648ee67041e4e9f52290003"
-
-
-def swarmctl(*args):
-    return subprocess.run([PROGRAMS / "swarmctl", *map(str, args)], text=True, capture_output=True)
 
 
 class Proofs(BrowserTest):
@@ -38,15 +32,10 @@ class Proofs(BrowserTest):
             done = swarmctl(*command)
             assert done.returncode == 0, done.stderr
         cls.page = cls.directory / "quickstart.html"
-        made = swarmctl("verify", cls.bundle, "--page", cls.page)
-        if "without the simulator" in made.stderr:
-            print("SKIPPED: the programs have no simulator for browsers; dist/build simulator makes it")
-            sys.exit(0)
-        assert made.returncode == 0, made.stderr
+        proof = with_simulator("verify", cls.bundle, "--page", cls.page)
         # A browser does not know the folder of a file.
-        cls.proof = made.stdout.strip().removeprefix(f"{cls.directory}/")
-        cls.fleet = Fleet()
-        cls.addClassCleanup(cls.fleet.stop)
+        cls.proof = proof.removeprefix(f"{cls.directory}/")
+        cls.start_fleet()
 
     def choose(self, path):
         self.find("#file").send_keys(str(path))

@@ -13,7 +13,7 @@ import urllib.request
 import xml.etree.ElementTree
 import zipfile
 
-from harness import CONFIG, NARROW, PROGRAMS, BrowserTest, Fleet
+from harness import CONFIG, NARROW, PROGRAMS, BrowserTest
 
 from selenium import webdriver
 from selenium.webdriver.common.by import By
@@ -25,18 +25,12 @@ class Replays(BrowserTest):
 
     @classmethod
     def setUpClass(cls):
-        cls.fleet = Fleet()
-        cls.addClassCleanup(cls.fleet.stop)
-        cls.fleet.start_worker()
-        cls.fleet.swarmctl("submit", str(CONFIG), "--generations", "6", "--watch")
+        cls.start_fleet(generations=6)
 
     def open(self, path):
         self.browser.get(self.fleet.pages + path)
         # A hanging page fails its test soon, before the deadline of the driver.
         self.browser.set_script_timeout(20)
-
-    def texts(self, selector):
-        return self.script(f"return [...document.querySelectorAll('{selector}')].map((it) => it.textContent)")
 
     def test_the_page_answers_after_every_kind_of_new_simulation(self):
         def press(selector):

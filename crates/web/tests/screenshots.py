@@ -60,14 +60,37 @@ class Screenshots(BrowserTest):
                 replay(*champion(run), "--to", html)
                 self.browser.get(f"{html.as_uri()}#step={step}&robot={robot}")
                 self.wait_for_text(".robot-panel h2", f"Robot {robot}")
-                self.shoot(f"replay-{name}", 1200, 900)
+                self.shoot(f"replay-{name}", 1200, 900, ".episode")
             replay(*champion("light_follower_snes"), "--to", FIGURES / "picture-light.svg", "--at", "300", "--size", "600")
+
+    def test_an_intervention(self):
+        """Needs programs with the simulator for browsers."""
+        with tempfile.TemporaryDirectory() as directory:
+            html = pathlib.Path(directory) / "light.html"
+            replay(*champion("light_follower_snes"), "--to", html)
+            self.browser.get(f"{html.as_uri()}#step=330&beside=1&interventions=150:robot:4:mute,150:robot:7:mute,150:robot:2:mute")
+            self.wait_for_text("#difference", "instead of")
+            self.shoot("pages-intervene", 1250, 960)
 
     def test_last_steps_of_the_tasks(self):
         for name, trial in TASKS.items():
             last = json.loads((ROOT / f"configs/tasks/{name}.json").read_text())["algorithm"]["evaluation_steps"] - 1
             picture = ["--at", str(last), "--size", "780", "--to", FIGURES / f"task-{name}.png"]
             replay(*champion(f"tasks/{name}", 1_000_000), "--trial", str(trial), *picture)
+
+    def test_a_fleet_that_is_treated_badly(self):
+        with tempfile.TemporaryDirectory() as directory:
+            html = pathlib.Path(directory) / "fleet.html"
+            subprocess.run([PROGRAMS / "swarmctl", "web", "--demo", html], check=True, capture_output=True)
+            self.browser.get(html.as_uri())
+            self.wait(lambda: int(self.script("return document.querySelector('.demo-parts')?.dataset.generations ?? 0")) >= 8, "no generations")
+            for health, workers in {"killed": (3, 8), "hung": (6, 13), "slow": (1, 15), "lying": (10, 17)}.items():
+                self.script(f"document.querySelector('.tool [value={health}]').click()")
+                for worker in workers:
+                    self.script(f"document.querySelectorAll('.worker')[{worker}].click()")
+            for worker in (10, 17):
+                self.wait(lambda: "quarantined" in self.script(f"return document.querySelectorAll('.worker')[{worker}].ariaLabel"), "no quarantine")
+            self.shoot("pages-demo", 1250, 690)
 
     def test_pages_of_a_fleet(self):
         fleet = Fleet()
