@@ -1,6 +1,8 @@
 //! A coordinator for tests that follows a script.
 
 mod fleet;
+mod fronts;
+mod lineage;
 mod repertoires;
 
 use std::{
@@ -11,18 +13,18 @@ use std::{
 };
 
 use swarm_proto::v1::{
-    Ancestor, ArchiveExperimentRequest, ArchiveExperimentResponse, BirthOperator,
-    CancelExperimentRequest, CancelExperimentResponse, CompletedGeneration,
-    DeleteExperimentRequest, DeleteExperimentResponse, Event, Experiment, ExperimentState,
-    ExplainExperimentRequest, ExplainExperimentResponse, ExportExperimentRequest,
-    ExportExperimentResponse, ExtendExperimentRequest, ExtendExperimentResponse,
-    GenerationDynamics, GenerationSummary, GenesOfParent, GetChampionRequest, GetChampionResponse,
-    GetExperimentRequest, GetExperimentResponse, GetIndividualsRequest, GetIndividualsResponse,
+    ArchiveExperimentRequest, ArchiveExperimentResponse, CancelExperimentRequest,
+    CancelExperimentResponse, CompletedGeneration, DeleteExperimentRequest,
+    DeleteExperimentResponse, Event, Experiment, ExperimentState, ExplainExperimentRequest,
+    ExplainExperimentResponse, ExportExperimentRequest, ExportExperimentResponse,
+    ExtendExperimentRequest, ExtendExperimentResponse, GenerationDynamics, GenerationSummary,
+    GetChampionRequest, GetChampionResponse, GetExperimentRequest, GetExperimentResponse,
+    GetFrontRequest, GetFrontResponse, GetIndividualsRequest, GetIndividualsResponse,
     GetLineageRequest, GetLineageResponse, GetRepertoireRequest, GetRepertoireResponse,
     ImportExperimentRequest, ImportExperimentResponse, LabelExperimentRequest,
     LabelExperimentResponse, ListDynamicsRequest, ListDynamicsResponse, ListEventsRequest,
     ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse, ListGenerationsRequest,
-    ListGenerationsResponse, PauseExperimentRequest, PauseExperimentResponse, PopulationLineage,
+    ListGenerationsResponse, PauseExperimentRequest, PauseExperimentResponse,
     PruneExperimentRequest, PruneExperimentResponse, ResumeExperimentRequest,
     ResumeExperimentResponse, RetryExperimentRequest, RetryExperimentResponse, SetPriorityRequest,
     SetPriorityResponse, StateChange, SubmitExperimentRequest, SubmitExperimentResponse,
@@ -247,36 +249,14 @@ impl ExperimentService for FakeCoordinator {
         &self,
         _: Request<GetLineageRequest>,
     ) -> Result<Response<GetLineageResponse>, Status> {
-        let ancestor = |generation, individual, fitness, genes| Ancestor {
-            generation,
-            individual,
-            fitness,
-            genes,
-            ..Ancestor::default()
-        };
-        let parent = |individual, genes| GenesOfParent { individual, genes, generation: None };
-        let ancestors = vec![
-            Ancestor {
-                operator: BirthOperator::Crossover.into(),
-                parents: vec![parent(0, 7), parent(4, 2)],
-                new_genes: 1,
-                ..ancestor(2, 5, 1.5, 10)
-            },
-            Ancestor {
-                operator: BirthOperator::Elite.into(),
-                parents: vec![parent(4, 10)],
-                ..ancestor(1, 0, 1.25, 7)
-            },
-            Ancestor {
-                operator: BirthOperator::Copy.into(),
-                parents: vec![parent(4, 9)],
-                new_genes: 1,
-                ..ancestor(1, 4, 0.5, 2)
-            },
-            ancestor(0, 4, 1.0, 9),
-        ];
-        let lineage = PopulationLineage { population: "p1".into(), ancestors };
-        Ok(Response::new(GetLineageResponse { populations: vec![lineage] }))
+        Ok(Response::new(lineage::lineage()))
+    }
+
+    async fn get_front(
+        &self,
+        request: Request<GetFrontRequest>,
+    ) -> Result<Response<GetFrontResponse>, Status> {
+        Ok(Response::new(fronts::front(request.into_inner())))
     }
 
     async fn get_repertoire(

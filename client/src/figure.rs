@@ -1,11 +1,13 @@
-//! Figures: curves with a band around each, and heat maps, as SVG or PNG. The same data give
-//! the same bytes on every machine: the font is part of the program.
+//! Figures: curves with a band around each, heat maps and scatter plots, as SVG or PNG. The same
+//! data give the same bytes on every machine: the font is part of the program.
 
 mod draw;
 mod heat_map;
+mod scatter;
 
 pub use draw::{Drawing, FONT, embed_font};
 pub use heat_map::{HeatMap, MapAxis};
+pub use scatter::Scatter;
 
 use std::path::Path;
 

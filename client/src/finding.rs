@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, fmt, path::Path};
 
-use model::store::Holder;
+use model::{limits::BARRIER_AFTER, store::Holder, wire::round_name};
 use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{
@@ -16,8 +16,6 @@ pub const WORKERS_MAX: usize = 8;
 
 /// If a worker holds an item for longer, the findings suggest checking the worker.
 const LONG_MS: u64 = 60_000;
-/// If the last items of a round are held for longer, the experiment counts as stalled.
-const STALL_MS: u64 = 10_000;
 
 /// One cause of an experiment's progress, or of the lack of it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -95,7 +93,7 @@ impl Finding {
             | TakenByNone | RefereeTrouble | Audits => true,
             // Other items are computed meanwhile.
             Queued => held_ms == 0,
-            Barrier => held_ms >= STALL_MS,
+            Barrier => u128::from(held_ms) >= BARRIER_AFTER.as_millis(),
             _ => false,
         }
     }
@@ -329,7 +327,7 @@ fn of_round(
         let what = format!(
             "at the barrier: waiting for the last {} of {}, on {holders} for {held_for}",
             text::counted(n_held, "item"),
-            batch_name(round),
+            round_name(round),
         );
         findings.push(finding(Kind::Barrier, what, look(round)));
     } else if n_held > 0 {
@@ -385,18 +383,6 @@ fn finding(
     next_steps: impl IntoIterator<Item = String>,
 ) -> Finding {
     Finding { kind, what: what.into(), next_steps: next_steps.into_iter().collect() }
-}
-
-/// The subject of a batch: "generation 12", or the champion after it.
-pub fn batch_name(round: &Round) -> String {
-    let generation = round.generation;
-    if round.judgement {
-        format!("the judgement of the champion after generation {generation}")
-    } else if round.held_out {
-        format!("the re-evaluation of candidates for the champion after generation {generation}")
-    } else {
-        format!("generation {generation}")
-    }
 }
 
 #[cfg(test)]

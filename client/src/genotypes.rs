@@ -2,9 +2,9 @@
 
 use model::{Address, Who};
 use swarm_proto::v1::{
-    Experiment, GetChampionResponse, GetExperimentRequest, GetIndividualsRequest,
-    GetIndividualsResponse, GetLineageRequest, GetLineageResponse, GetRepertoireRequest,
-    GetRepertoireResponse,
+    Experiment, GetChampionResponse, GetExperimentRequest, GetFrontRequest, GetFrontResponse,
+    GetIndividualsRequest, GetIndividualsResponse, GetLineageRequest, GetLineageResponse,
+    GetRepertoireRequest, GetRepertoireResponse,
 };
 
 use crate::{
@@ -52,6 +52,18 @@ impl Connection {
         let request = GetLineageRequest { address: address.to_string(), depth };
         let answer = self.call(async |client| client.get_lineage(request.clone()).await).await;
         answer.map_err(|error| error.about(address))
+    }
+
+    /// The front after a generation, by default the latest one. `reference`: the point up to which
+    /// volume counts; empty: the coordinator chooses it.
+    pub async fn front(
+        &self,
+        experiment_id: u64,
+        generation: Option<u64>,
+        reference: Vec<f64>,
+    ) -> Result<GetFrontResponse, Error> {
+        let request = GetFrontRequest { experiment_id, generation, reference };
+        self.call(async |client| client.get_front(request.clone()).await).await
     }
 
     /// The repertoire after a generation, by default the latest one.

@@ -10,9 +10,9 @@ pub enum OutputFormat {
     Table,
     /// Like table, but with all columns at full width.
     Wide,
-    /// For programs: `run`, `watch` and `submit --watch` print one
-    /// object per line, the other commands one document.
+    /// For programs: one document, or one object per line while a command follows something (run,
+    /// watch, fleet, web, --watch).
     Json,
-    /// For spreadsheets: `list`, `history` and `workers` only.
+    /// For spreadsheets: tables only (front, history, list, repertoire, workers).
     Csv,
 }

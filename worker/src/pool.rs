@@ -12,8 +12,8 @@ use std::{
     time::Instant,
 };
 
+use model::limits::ITEMS_PER_SLOT_MAX;
 use sim_core::panic_to_failure;
-use swarm_proto::ITEMS_PER_SLOT_MAX;
 use tokio::sync::mpsc;
 use tracing::warn;
 

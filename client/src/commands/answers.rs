@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::{
     bench, compare, completions, doctor, evaluate, examples, explain, export, export_controller,
-    fleet, history, lineage, man, new, plot, repertoire, replay, schema, simulate, validate,
+    fleet, front, history, lineage, man, new, plot, repertoire, replay, schema, simulate, validate,
     verify, web, workers,
 };
 use crate::{
@@ -59,7 +59,7 @@ type Part = fn(&mut SchemaGenerator) -> Schema;
 struct Printed {
     commands: &'static [&'static str],
     form: Form,
-    /// The answers, one of which each value is.
+    /// The types of its answers: every printed value has one of them.
     parts: &'static [Part],
 }
 
@@ -113,7 +113,11 @@ const PRINTED: &[Printed] = &[
         ],
     },
     Printed { commands: &["fleet"], form: Form::Lines, parts: &[part::<fleet::Look<'_>>()] },
-    Printed { commands: &["web"], form: Form::Lines, parts: &[part::<web::Served>()] },
+    Printed {
+        commands: &["web"],
+        form: Form::Lines,
+        parts: &[part::<web::Served>(), part::<web::Written>()],
+    },
     document(&["backup"], &[part::<doctor::InspectionDocument<'_>>()]),
     document(&["bench"], &[part::<bench::Report<'_>>()]),
     document(
@@ -130,6 +134,7 @@ const PRINTED: &[Printed] = &[
     document(&["explain"], &[part::<Explanations<'_>>(), part::<explain::fleet::Fleet<'_>>()]),
     document(&["export"], &[part::<export::Written>()]),
     document(&["export-controller"], &[part::<export_controller::Written<'_>>()]),
+    document(&["front"], &[part::<front::Document>(), part::<front::Drawn>()]),
     document(
         &["history"],
         &[part::<Vec<GenerationLine<'_>>>(), part::<Vec<history::dynamics::Record>>()],

@@ -75,7 +75,8 @@ impl Remote for PauseArgs {
 /// cancelled one, give its number. With --generations, it extends completed experiments:
 /// generations, re-evaluations, champion and digests become those of a run that had the new length
 /// from the start, and the champion is judged again at the new end, on other trials. An experiment
-/// that has reached its target fitness cannot be extended: `fork` continues it under another target.
+/// that has reached its target fitness cannot be extended: `fork` continues it under another
+/// target.
 #[derive(Debug, Args)]
 pub struct ResumeArgs {
     #[command(flatten)]

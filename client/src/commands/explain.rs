@@ -4,7 +4,7 @@ pub mod fleet;
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
-use model::wire::has_ended;
+use model::wire::{has_ended, round_name};
 use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{
@@ -15,7 +15,7 @@ use crate::{
     clock, complete,
     connection::{Connection, present},
     error::Error,
-    finding::{self, Finding, WORKERS_MAX, batch_name},
+    finding::{self, Finding, WORKERS_MAX},
     json,
     progress::Progress,
     remote::Remote,
@@ -100,7 +100,7 @@ async fn explain(
 fn batch_lines(round: &Round) -> String {
     let mut lines = vec![format!(
         "{}: {} of {} episodes done in {}; {} without a worker",
-        batch_name(round),
+        round_name(round),
         round.episodes - round.episodes_left.min(round.episodes),
         round.episodes,
         clock::duration_ms(round.running_ms),

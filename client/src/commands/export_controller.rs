@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use sim_core::{FINGERPRINT, TrialSet};
 
-use super::subject::{Subject, SubjectArgs};
+use super::genotype_args::{Found, GenotypeArgs};
 use crate::{
     args::whole,
     error::{Code, Error},
@@ -36,7 +36,7 @@ use crate::{
 #[command(after_help = HELP)]
 pub struct ExportControllerArgs {
     #[command(flatten)]
-    subject: SubjectArgs,
+    which: GenotypeArgs,
     /// Language of the controller.
     #[arg(long, value_enum, default_value_t = Language::C)]
     language: Language,
@@ -112,12 +112,12 @@ pub async fn export_controller(
             "a controller in ONNX has no recorded episodes; leave out --trials and --generation";
         return Err(Error::at(Code::BadArgument, option, why));
     }
-    let Subject { file, genotype, generation, .. } = args.subject.find(settings, progress).await?;
+    let Found { file, genotype, generation, .. } = args.which.find(settings, progress).await?;
     let Compiled { config, experiment: simulation, .. } =
         file.compile(&Overrides::default()).map_err(|error| file.invalid(&error))?;
     let about = About {
         experiment: config.name.clone(),
-        genotype: args.subject.title(&genotype),
+        genotype: args.which.title(&genotype),
         config_digest: Digest::of_config(&config, FINGERPRINT).to_string(),
     };
     let output = args.overwrite.begin_files(&args.to, args.language.names())?;

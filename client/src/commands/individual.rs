@@ -22,6 +22,7 @@ family! {
         Individual(IndividualArgs),
         Lineage(super::lineage::LineageArgs),
         Repertoire(super::repertoire::RepertoireArgs),
+        Front(super::front::FrontArgs),
     }
 }
 

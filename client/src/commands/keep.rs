@@ -1,4 +1,4 @@
-//! `swarmctl get`, `delete`, `prune`, `archive` and `label`: stored experiments, and the
+//! `swarmctl delete`, `prune`, `archive` and `label`: stored experiments, and the
 //! labels that find them.
 
 use clap::Args;
@@ -11,11 +11,10 @@ use swarm_proto::v1::{
 
 use super::{
     control::{print, print_of},
-    export, import,
+    export, get, import,
 };
 use crate::{
     args::{Label, Target},
-    change::Json,
     complete,
     connection::{Connection, present},
     consent::Consent,
@@ -30,7 +29,7 @@ use crate::{
 family! {
     /// Commands for stored experiments.
     Keep {
-        Get(GetArgs),
+        Get(get::GetArgs),
         Label(LabelArgs),
         Archive(ArchiveArgs),
         Prune(PruneArgs),
@@ -220,35 +219,11 @@ fn mib(bytes: u64) -> String {
     format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
 }
 
-/// Print the experiment file of an experiment.
-///
-/// The file is in canonical form: every key that has an effect, including the seed. If you
-/// submit it again, it gives the same bits.
-#[derive(Debug, Args)]
-#[command(after_help = GET_HELP)]
-pub struct GetArgs {
-    #[command(flatten)]
-    target: Target,
-}
-
-const GET_HELP: &str = "\
-Examples:
-  swarmctl get 3 > experiment.json
-  swarmctl get 3 | swarmctl validate -";
-
-impl Remote for GetArgs {
-    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        let experiment_id = connection.one(&self.target.subject).await?.id;
-        let (_, config_json) = connection.stored(experiment_id).await?;
-        progress.print_document(&Json::parse(&config_json))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use swarm_proto::v1::{ForkPoint, SubmitExperimentRequest};
 
-    use super::{super::one_world::output, *};
+    use super::{super::tests::one_world::output, *};
     use crate::{experiment_file::tests::quickstart, place::Place};
 
     #[tokio::test(flavor = "multi_thread")]

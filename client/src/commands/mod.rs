@@ -10,6 +10,7 @@ mod completions;
 mod compute;
 pub mod control;
 mod doctor;
+mod elites;
 mod evaluate;
 mod examples;
 mod explain;
@@ -17,6 +18,9 @@ mod export;
 mod export_controller;
 pub mod fleet;
 mod fork;
+mod front;
+mod genotype_args;
+mod get;
 mod history;
 mod import;
 pub mod individual;
@@ -34,7 +38,6 @@ mod replay;
 mod run;
 pub mod schema;
 mod simulate;
-mod subject;
 pub mod submit;
 mod validate;
 mod verify;
@@ -116,7 +119,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         return Err(Error::at(
             Code::BadArgument,
             "--output",
-            "`--output csv` is for tables: history, list, repertoire and workers; this command \
+            "`--output csv` is for tables: front, history, list, repertoire and workers; this command \
              has table, wide and json",
         ));
     }
@@ -202,8 +205,5 @@ async fn ask(
     result
 }
 
-#[cfg(test)]
-#[cfg(feature = "local")]
-mod one_world;
 #[cfg(test)]
 mod tests;

@@ -137,7 +137,7 @@ mod tests {
     use super::*;
     use crate::{
         cli::Args,
-        commands::{Command, one_world::output},
+        commands::{Command, tests::one_world::output},
         examples::EXAMPLES,
         experiment_file::{ExperimentFile, Overrides},
         output_format::OutputFormat,

@@ -63,7 +63,7 @@ mod tests {
 
     use serde_json::json;
 
-    use super::{super::one_world::output, *};
+    use super::{super::tests::one_world::output, *};
     use crate::{
         experiment_file::tests::quickstart,
         place::{Intent, Place},

@@ -1,15 +1,16 @@
-//! `swarmctl repertoire`: elites of different behaviour, as a table, for programs, or as a heat map.
+//! `swarmctl repertoire`: elites of different behaviour, as a table, for programs, or as a heat
+//! map.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
-use model::Who;
 use schemars::JsonSchema;
 use serde::Serialize;
 use swarm_proto::v1::{DescriptorAxis, Elite, Experiment, GetRepertoireResponse};
 use swarm_telemetry::number;
 
+use super::elites::{address, experiment_at};
 use crate::{
     address::NamedAddress,
     complete,
@@ -24,7 +25,7 @@ use crate::{
     text,
 };
 
-/// Print the elites of a repertoire, which MAP-Elites and DNS evolve, or draw them as a map.
+/// Print the elites of a repertoire, such as MAP-Elites evolves, or draw them as a map.
 ///
 /// The table has the fittest elite of every cell. Once a run has ended, every elite is judged
 /// on trials that selected nothing: it is then in the cell of its judged behaviour. Before, the
@@ -144,16 +145,8 @@ impl Remote for RepertoireArgs {
     }
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        let address = connection.resolve(&self.address).await?;
-        let generation = match address.who {
-            Who::Champion => None,
-            Who::Generation(generation) => Some(generation),
-            _ => {
-                let message = format!("`{address}` is not a repertoire: name ID or ID@G");
-                return Err(Error::at(Code::BadArgument, address, message));
-            }
-        };
-        let (experiment, _) = connection.stored(address.experiment.0).await?;
+        let (experiment, generation) =
+            experiment_at(connection, &self.address, "repertoire").await?;
         let found = connection.repertoire(experiment.id, generation).await?;
         if let Some(to) = &self.to {
             heat_map(&experiment, &found)?.write(to, self.overwrite)?;
@@ -246,10 +239,6 @@ fn csv_keys(axes: &[DescriptorAxis]) -> Vec<String> {
     let own = ["address", "shown", "trials", "fitness", "cell"].map(str::to_owned);
     let judged = ["judged.fitness", "judged.cell"].map(str::to_owned);
     [&own[..], &point(""), &judged, &point("judged.")].concat()
-}
-
-fn address(experiment: &Experiment, elite: &Elite) -> String {
-    format!("{}@{}/{}", experiment.id, elite.generation, elite.individual)
 }
 
 /// The shown elites, each with the cell, the fitness and the descriptors that count now.

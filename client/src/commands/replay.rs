@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use experiment_file::limits;
+use replay::{Episode, Judged, Replay, ReplayError, Trials};
 use schemars::JsonSchema;
 use serde::Serialize;
 use sim_core::{RoomRecord, StepRecord, TrialSet};
-use swarm_web::{Episode, Replay, ReplayError, Trials, replay_file};
+use swarm_proto::v1::JudgedFitness;
+use swarm_web::replay_file;
 
 use self::picture::PictureArgs;
-use super::subject::{Subject, SubjectArgs};
+use super::genotype_args::{Found, GenotypeArgs};
 use crate::{
     args::{SeedArg, StepsArg, whole},
     change::{Change, SetArg},
@@ -34,7 +36,7 @@ use crate::{
 #[command(after_help = HELP)]
 pub struct ReplayArgs {
     #[command(flatten)]
-    subject: SubjectArgs,
+    which: GenotypeArgs,
     #[command(flatten)]
     seed: SeedArg,
     /// Generation of the worlds to simulate, from 0 [default: that of the address; 0 for an
@@ -87,8 +89,7 @@ pub async fn replay(
 ) -> Result<(), Error> {
     let (path, format) = args.path()?;
     args.overwrite.check(&path)?;
-    let Subject { file, genotype, generation, judged } =
-        args.subject.find(settings, progress).await?;
+    let Found { file, genotype, generation, judged } = args.which.find(settings, progress).await?;
     let mut changes = Vec::new();
     for text in &args.set.set {
         let parsed = Change::parse_all(text);
@@ -100,7 +101,7 @@ pub async fn replay(
         Overrides { seed: args.seed.seed, steps: args.steps.steps, ..Overrides::default() };
     let compiled = file.changed(&changes).and_then(|file| file.compile(&overrides));
     let compiled = compiled.map_err(|error| file.invalid(&error))?;
-    let name = args.subject.title(&genotype);
+    let name = args.which.title(&genotype);
     let episode = Episode {
         config: &compiled.config,
         simulation: &compiled.experiment,
@@ -112,11 +113,12 @@ pub async fn replay(
     let mut trials = None;
     let episode = match judged {
         Some(judged) if args.trial.is_none() && args.generation.is_none() => {
-            let n = judged.trials;
+            let JudgedFitness { mean, low, high, trials: n, generation: last } = judged;
+            let known = Judged { generation: last, trials: n, mean, interval: (low, high) };
             let what =
                 format!("computing the {n} trials of its judgement; --trial N plays one alone");
             let all = waiting::busy(&what, || {
-                Trials::of_judgement(episode.simulation, episode.genotype, &judged, &|| true)
+                Trials::of_judgement(episode.simulation, episode.genotype, known, &|| true)
             });
             let all = all.map_err(|error| Error::Input(format!("{name}: {error}")).about(&name))?;
             let all = all.expect("nothing stops it");
@@ -135,7 +137,7 @@ pub async fn replay(
         _ => episode,
     };
     let bytes = waiting::busy("computing the episode", || match format {
-        Format::Html => html(&episode, trials).map(String::into_bytes),
+        Format::Html => html(&episode, generation, trials).map(String::into_bytes),
         Format::Png => picture::png(
             &compiled.config,
             room(&episode)?.as_ref(),
@@ -184,7 +186,7 @@ enum Format {
     Svg,
 }
 
-fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> {
+fn html(episode: &Episode<'_>, generation: u64, trials: Option<Trials>) -> Result<String, Error> {
     let replay = Replay::simulate(episode).map_err(|error| match error {
         ReplayError::Evaluate(error) => {
             let message = format!("{}: {error}", episode.name);
@@ -192,10 +194,11 @@ fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> 
         }
         error => Error::Input(error.to_string()).about(episode.name),
     })?;
-    Ok(replay_file(&match trials {
+    let replay = match trials {
         Some(trials) => replay.of_trials(trials),
         None => replay,
-    }))
+    };
+    Ok(replay_file(episode, generation, &replay))
 }
 
 /// The room of an episode in a world with bodies.
@@ -218,7 +221,7 @@ fn steps(episode: &Episode<'_>) -> Result<Vec<StepRecord>, Error> {
 impl ReplayArgs {
     /// The file to write.
     fn path(&self) -> Result<(PathBuf, Format), Error> {
-        let path = match (&self.to, &self.subject.address) {
+        let path = match (&self.to, &self.which.address) {
             (Some(path), _) => path.clone(),
             (None, Some(address)) => {
                 format!("replay-{}.html", address.to_string().replace('/', "-")).into()

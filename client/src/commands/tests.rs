@@ -1,6 +1,9 @@
 //! The output that users see: the help and the answers of every command, with a scripted
 //! coordinator, and the refusals of each option.
 
+#[cfg(feature = "local")]
+pub mod one_world;
+
 use std::collections::BTreeSet;
 
 use clap::{CommandFactory as _, Parser as _};
@@ -240,7 +243,12 @@ async fn answers_for_people() {
         "repertoire leader@1",
         "repertoire 3 --output json",
         "repertoire 3@1 --output csv",
+        "front 3",
+        "front leader@1",
+        "front 3 --reference -1,2 --output json",
+        "front 3@1 --output csv",
         "repertoire 3@1/2",
+        "front 3@1/2",
         "wait 3 --for ended",
         "wait 3",
         "explain 3",

@@ -6,11 +6,11 @@ use bundle::{Bundle, Claim, Flaw, Proof, Sample, Verification, sha256};
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
-use swarm_web::{SIMULATOR, proof_file};
+use swarm_web::proof_file;
 
 use super::export;
 use crate::{
-    args::IsaArgs, error::Error, output_file::Overwrite, progress::Progress,
+    args::IsaArgs, error::Error, output_file::Overwrite, pages::simulator, progress::Progress,
     resimulation::Resimulation, settings::Settings, waiting,
 };
 
@@ -31,8 +31,8 @@ pub struct VerifyArgs {
     /// Number of threads that simulate here [default: one per core]
     #[arg(long, value_name = "N", value_parser = crate::args::whole::<u16>(1..=1024))]
     workers: Option<u16>,
-    /// Also write a page that proves the claims in a browser: one HTML file with this bundle and the
-    /// simulator, for readers who install nothing.
+    /// Also write a page that proves the claims in a browser: one HTML file with this bundle and
+    /// the simulator, for readers who install nothing.
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
     #[command(flatten)]
@@ -52,9 +52,6 @@ Examples:
   swarmctl verify leader.zip --generations all --coordinator http://fleet.example:7700
   swarmctl verify leader.zip --page leader.html";
 
-const WITHOUT_SIMULATOR: &str = "--page: this program was compiled without the simulator for browsers, which \
-                                 releases have; `dist/build simulator` makes it";
-
 fn sample(text: &str) -> Result<Sample, String> {
     match (text, text.parse()) {
         ("all", _) => Ok(Sample::All),
@@ -68,8 +65,7 @@ impl VerifyArgs {
     fn page(&self) -> Result<Option<(&Path, &'static [u8])>, Error> {
         let Some(path) = &self.page else { return Ok(None) };
         self.overwrite.check(path)?;
-        let simulator = SIMULATOR.ok_or_else(|| Error::Input(WITHOUT_SIMULATOR.to_owned()))?;
-        Ok(Some((path, simulator)))
+        Ok(Some((path, simulator("--page")?)))
     }
 }
 

@@ -5,8 +5,8 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Serialize;
 use serde_json::json;
 
-/// An entry for each exit code, with its line in the help and a row for each of its codes. Codes are
-/// part of the interface for programs: add, but never rename.
+/// An entry for each exit code, with its line in the help and a row for each of its codes. Codes
+/// are part of the interface for programs: add, but never rename.
 macro_rules! codes {
     ($($exit_code:literal: $about:literal {
         $($variant:ident, $name:literal, $meaning:literal, $next:literal;)*

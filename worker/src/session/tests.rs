@@ -382,7 +382,7 @@ async fn more_items_than_the_credit_allows_are_failed() {
     coordinator.send_spec(1, "").await;
     coordinator.send_assignments(1, [1]).await;
     assert_eq!(starts.recv().await, Some(1));
-    let n_queued = swarm_proto::ITEMS_PER_SLOT_MAX as u64;
+    let n_queued = model::limits::ITEMS_PER_SLOT_MAX as u64;
     coordinator.send_assignments(1, 2..n_queued + 4).await;
     let results = coordinator.results(2).await;
     assert!(results.iter().all(|result| failure(result).contains("queued")));

@@ -37,7 +37,7 @@ pub struct EvaluateArgs {
     #[command(flatten)]
     pub changed: ChangedArg,
     /// Number of trials per condition.
-    #[arg(long, value_name = "N", default_value_t = 50, value_parser = whole::<u32>(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = whole(1..=limits::TRIALS))]
     pub trials: u32,
     #[command(flatten)]
     pub steps: StepsArg,

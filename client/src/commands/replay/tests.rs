@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::{picture::Moments, *};
 use crate::{
     cli::Args,
-    commands::{Command, one_world::output},
+    commands::{Command, tests::one_world::output},
     experiment_file::{ExperimentFile, tests::quickstart},
     output_format::OutputFormat,
     progress::tests::Captured,
@@ -39,7 +39,7 @@ async fn the_file_stands_alone_and_is_small() {
     let options = ["--to", to, "--steps", "1000", "--set", robots, "--trial", "1"];
     assert_eq!(run(directory.path(), &options).await.unwrap(), [to]);
     let html = fs::read_to_string(&path).unwrap();
-    assert!(html.len() < 2_000_000, "{} bytes", html.len());
+    assert!(html.len() < 2_250_000, "{} bytes", html.len());
     assert!(!html.contains("http:") && !html.contains("https:"));
     assert!(html.contains("default-src 'none'"));
 }

@@ -5,7 +5,7 @@ use tonic::Status;
 
 use super::*;
 use crate::{
-    commands::one_world::output,
+    commands::tests::one_world::output,
     experiment_file::tests::quickstart,
     fake_coordinator::{FakeCoordinator, Script, generation, state, unreachable_connection},
     output_format::OutputFormat,

@@ -22,7 +22,7 @@ use crate::{
 
 /// Arguments that name a genotype.
 #[derive(Debug, Args)]
-pub struct SubjectArgs {
+pub struct GenotypeArgs {
     /// The genotype: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation
     /// G; ID@G/mean, the mean of the distribution after generation G.
     #[arg(add = ArgValueCompleter::new(complete::experiments), required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
@@ -39,7 +39,7 @@ pub struct SubjectArgs {
 }
 
 /// A genotype with its experiment.
-pub struct Subject {
+pub struct Found {
     pub file: ExperimentFile,
     pub genotype: Genotype,
     /// Its generation; 0 for a file.
@@ -48,13 +48,13 @@ pub struct Subject {
     pub judged: Option<JudgedFitness>,
 }
 
-impl SubjectArgs {
+impl GenotypeArgs {
     /// Reads the files, or asks for the genotype at the address.
-    pub async fn find(&self, settings: Settings, progress: &Progress) -> Result<Subject, Error> {
+    pub async fn find(&self, settings: Settings, progress: &Progress) -> Result<Found, Error> {
         if let (Some(config), Some(genotype)) = (&self.config, &self.genotype) {
             let file = ExperimentFile::read(config)?;
             let genotype = Genotype::read(genotype, &file, self.changed)?;
-            return Ok(Subject { file, genotype, generation: 0, judged: None });
+            return Ok(Found { file, genotype, generation: 0, judged: None });
         }
         let address = self.address.as_ref().expect("clap requires an address or a file");
         let connection = Connection::open(settings, Intent::Read, progress).await?;
@@ -64,7 +64,7 @@ impl SubjectArgs {
         let file = ExperimentFile::new(name.into(), found.config_json.clone());
         let generation = found.individual.generation;
         let judged = found.individual.judged.filter(|judged| judged.trials > 0);
-        Ok(Subject { file, genotype: Genotype::found(address, found), generation, judged })
+        Ok(Found { file, genotype: Genotype::found(address, found), generation, judged })
     }
 
     /// The source of the genotype, for readers of a file that the command writes. Leaves out the
