@@ -2,7 +2,6 @@
 
 use std::{
     path::Path,
-    process,
     sync::{Mutex, PoisonError},
 };
 
@@ -11,14 +10,14 @@ use pyo3::{exceptions::PyOSError, prelude::*};
 
 use crate::{
     errors::{fork_error, refused},
-    running::guarded,
+    running::{Home, guarded},
 };
 
 /// A data directory, opened for reading only. A coordinator may use it meanwhile.
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Database {
     reader: Mutex<BlockingReader>,
-    process: u32,
+    home: Home,
 }
 
 #[pymethods]
@@ -27,12 +26,12 @@ impl Database {
     fn new(directory: &str) -> PyResult<Self> {
         let reader = BlockingReader::open(Path::new(directory));
         let reader = reader.map_err(|error| PyOSError::new_err(error.to_string()))?;
-        Ok(Self { reader: Mutex::new(reader), process: process::id() })
+        Ok(Self { reader: Mutex::new(reader), home: Home::here() })
     }
 
     /// A reading call of `ExperimentService`, by its name, with encoded request and response.
     fn call(&self, py: Python<'_>, name: &str, request: &[u8]) -> PyResult<Vec<u8>> {
-        if self.process != process::id() {
+        if self.home.is_left() {
             return Err(fork_error(py, "a data directory is opened again after a fork"));
         }
         let answer = guarded(py, || {

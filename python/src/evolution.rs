@@ -2,7 +2,8 @@
 
 use coordinator::local::completion;
 use evolution::{
-    ALGORITHMS, Champion, ChampionSource, EvolutionError, Generation, Learnt, Setup, SetupError,
+    ALGORITHMS, Champion, ChampionSource, Direction, End, Evaluations, EvolutionError, Generation,
+    Learnt, Setup, SetupError,
 };
 use experiment_file::{
     AlgorithmDescription, DefaultValue, Domain, ExperimentConfig, Parameter, ParameterValue, Params,
@@ -26,9 +27,14 @@ const DRAWN_PER_GENE: u128 = 4;
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Evolution(Shared<State>);
 
-/// The answer to fitness without descriptors.
-const REPERTOIRE: &str = "a repertoire learns from descriptors, too, which a fleet computes: run the \
-                          experiment on one (`swarmevo.local_fleet()`), or by `swarmctl run`";
+/// The answer to fitness without the measures that belong to it.
+const NO_MEASURES: &str = "a repertoire or a front also learns from measures: tell the values of its \
+                           descriptors or aims as `measures`, or let a fleet compute them: run the \
+                           experiment on one (`swarmevo.local_fleet()`), or by `swarmctl run`";
+
+/// The answer to the judgement of a champion alone.
+const NO_JUDGE: &str = "a fleet judges all elites; here, evaluate the genotypes of the elites on \
+                        trials that evolution has not met";
 
 /// A generation: index, best, mean, min, standard deviation, number of individuals
 /// without a finite fitness.
@@ -49,7 +55,8 @@ struct State {
 
 #[pymethods]
 impl Evolution {
-    /// An evolution of one population, for any function of genes in [0, 1].
+    /// An evolution of one population, for any function of genes in [0, 1]. `minimised`: whether
+    /// less of each aim beside fitness is better, for fronts.
     #[new]
     fn new(
         algorithm: &str,
@@ -57,9 +64,12 @@ impl Evolution {
         population_size: u32,
         seed: u64,
         params: &Bound<'_, PyDict>,
+        minimised: Vec<bool>,
     ) -> PyResult<Self> {
         let params = read_params(algorithm, params)?;
-        let setup = Setup { population_size, seed, params, ..Setup::new(algorithm, n_genes) };
+        let aim = |minimised| if minimised { Direction::Minimise } else { Direction::Maximise };
+        let aims = minimised.into_iter().map(aim).collect();
+        let setup = Setup { population_size, seed, params, aims, ..Setup::new(algorithm, n_genes) };
         let refused = |error: SetupError| PyValueError::new_err(error.to_string());
         setup.check().map_err(refused)?;
         let numbers = KEPT_PER_GENE + DRAWN_PER_GENE * u128::from(population_size);
@@ -106,27 +116,31 @@ impl Evolution {
     }
 
     /// Learns from the fitness `[P, T]` of the generation that `ask` returned; an error leaves
-    /// it unchanged. `experiment`: the experiment of this run. Returns the index of the
+    /// it unchanged. `experiment`: the experiment of this run. `measures`: `[P, T M]`, for each
+    /// trial the values of the descriptors or aims. Returns the index of the
     /// generation, best, mean, min, standard deviation, the number of individuals without a
     /// finite fitness, the notices, and the reason if the generation is the last one of the run.
-    #[pyo3(signature = (fitness, experiment=None))]
+    #[pyo3(signature = (fitness, experiment=None, measures=None))]
     fn tell(
         &self,
         py: Python<'_>,
         fitness: PyReadonlyArray2<'_, f64>,
         experiment: Option<&Experiment>,
+        measures: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<(Summary, Vec<String>, Option<String>)> {
         let fitness = rows(&fitness);
+        let descriptors = measures.map(|measures| rows(&measures));
         let learnt = self.0.with(py, |state| {
-            if state.evolution.n_descriptors() > 0 {
-                return Err(NotTold::Rows(REPERTOIRE.to_owned()));
-            }
+            let descriptors =
+                check_measures(&fitness, descriptors, state.evolution.n_descriptors())
+                    .map_err(NotTold::Rows)?;
             let asked = state.asked.get_or_insert_with(|| state.evolution.ask());
             check_rows(&fitness, asked.genotypes.len()).map_err(NotTold::Rows)?;
             let mut after = state.evolution.clone();
             let completion =
                 |summary: &_| experiment.and_then(|run| completion(run.config(), summary));
-            let learnt = after.learn(asked.clone(), &fitness, completion);
+            let told = Evaluations { fitness: &fitness, descriptors: &descriptors };
+            let learnt = after.learn(asked.clone(), told, completion);
             let learnt = learnt.map_err(NotTold::Evolution)?;
             *state = State { evolution: after, asked: None };
             Ok(learnt)
@@ -171,6 +185,29 @@ impl Evolution {
     fn mean<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
         let mean = self.0.with(py, |state| state.evolution.mean())?;
         Ok(mean.map(|mean| PyArray1::from_vec(py, mean)))
+    }
+
+    /// The elites of the front: genotypes `[N, d]`, fitness and then aims `[N, 1 + M]`, generation
+    /// and index of each birth; none without a front.
+    fn front<'py>(&self, py: Python<'py>) -> PyResult<Option<Elites<'py>>> {
+        let found = self.0.with(py, |state| {
+            let end = End::default();
+            let elites = state.evolution.front(&end)?.elites.into_iter();
+            Some(
+                elites
+                    .map(|elite| {
+                        let values = [&[elite.fitness], &elite.descriptors[..]].concat();
+                        (elite.genotype.to_vec(), values, (elite.generation, elite.individual))
+                    })
+                    .collect::<Vec<_>>(),
+            )
+        })?;
+        let Some(elites) = found else { return Ok(None) };
+        let genotypes: Vec<Vec<f64>> = elites.iter().map(|(genes, ..)| genes.clone()).collect();
+        let values: Vec<Vec<f64>> = elites.iter().map(|(_, values, _)| values.clone()).collect();
+        let born = elites.iter().map(|(.., born)| *born).collect();
+        let array = |rows: &[Vec<f64>]| PyArray2::from_vec2(py, rows);
+        Ok(Some((array(&genotypes)?, array(&values)?, born)))
     }
 
     /// A copy in the same state.
@@ -223,6 +260,9 @@ impl Evolution {
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
         let fitness = rows(&fitness);
         let judged = self.0.with(py, |state| {
+            if state.evolution.n_descriptors() > 0 {
+                return Err(NO_JUDGE.to_owned());
+            }
             let judgement = state.evolution.judgement();
             let judgement = judgement.ok_or("there is no champion before the first generation")?;
             check_rows(&fitness, 1)?;
@@ -290,6 +330,32 @@ fn check_rows(fitness: &[Vec<f64>], n_genotypes: usize) -> Result<(), String> {
          numbers, or of {n_genotypes} rows with a number for each trial"
     ))
 }
+
+/// Checks that there are measures for repertoires and fronts, and only for them: for each trial as
+/// many as expected. Returns them.
+fn check_measures(
+    fitness: &[Vec<f64>],
+    measures: Option<Vec<Vec<f64>>>,
+    n_measures: usize,
+) -> Result<Vec<Vec<f64>>, String> {
+    match (measures, n_measures) {
+        (None, 0) => Ok(Vec::new()),
+        (None, _) => Err(NO_MEASURES.to_owned()),
+        (Some(_), 0) => {
+            Err("this algorithm learns from fitness alone, without measures".to_owned())
+        }
+        (Some(measures), n) => {
+            let is_right = |(fitness, row): (&Vec<f64>, &Vec<f64>)| row.len() == n * fitness.len();
+            let fits =
+                measures.len() == fitness.len() && fitness.iter().zip(&measures).all(is_right);
+            let expected = "measures is an array [P, T, M]: for each trial of each genotype";
+            fits.then_some(measures).ok_or(format!("{expected} {n} values"))
+        }
+    }
+}
+
+/// Genotypes, values and births of elites.
+type Elites<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Vec<(u64, u32)>);
 
 /// Genotypes `[P, d]`; kind, generation and block of their trials.
 type AskedTrials<'py> = (Bound<'py, PyArray2<f64>>, (&'static str, u64, u8));

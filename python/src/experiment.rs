@@ -11,8 +11,9 @@ use pyo3::{
     prelude::*,
     types::{PyBytes, PyDict},
 };
+use replay::{Episode, Replay};
 use sim_core::{FINGERPRINT, Simulation};
-use swarm_web::{Episode, Replay, replay_file};
+use swarm_web::replay_file;
 
 use crate::{
     errors::{config_error, evaluate_error},
@@ -200,7 +201,8 @@ impl Experiment {
             let (config, simulation) = (&self.config, &self.simulation);
             let genotype = &genotype;
             let episode = Episode { config, simulation, genotype, name, trial_set, trial };
-            Replay::simulate(&episode).map(|replay| replay_file(&replay))
+            let generation = trial_set.generation().unwrap_or_default();
+            Replay::simulate(&episode).map(|replay| replay_file(&episode, generation, &replay))
         })?;
         html.map_err(|error| PyValueError::new_err(error.to_string()))
     }

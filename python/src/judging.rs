@@ -9,10 +9,10 @@ use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
 use numpy::{PyArrayMethods as _, PyReadonlyArray1};
 use pyo3::prelude::*;
-use sim_core::Simulation;
+use sim_core::{Simulation, panic_message};
 
 use crate::{
-    running::{KeepGoing, compute, panic_message},
+    running::{KeepGoing, compute},
     trials::Trials,
 };
 

@@ -2,7 +2,6 @@
 //! panic is an exception.
 
 use std::{
-    any::Any,
     io,
     panic::{AssertUnwindSafe, catch_unwind},
     process,
@@ -16,7 +15,7 @@ use std::{
 };
 
 use pyo3::prelude::*;
-use sim_core::EvaluateError;
+use sim_core::{EvaluateError, panic_message};
 
 use crate::errors::{evaluate_error, fork_error, panic_error};
 
@@ -87,7 +86,7 @@ pub fn compute<T: Send>(
                         continue;
                     }
                     Ok(Ok(Err(error))) => Failure::Evaluate(error),
-                    Ok(Err(panic)) => Failure::Panic(panic_message(&*panic)),
+                    Ok(Err(panic)) => Failure::Panic(panic_message(&*panic).to_owned()),
                     Err(RecvTimeoutError::Timeout) => {
                         match Python::attach(|py| py.check_signals()) {
                             Ok(()) => continue,
@@ -116,8 +115,10 @@ pub fn compute<T: Send>(
 
 /// Runs a short computation without the interpreter's lock.
 pub fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    py.detach(|| catch_unwind(AssertUnwindSafe(work)).map_err(|panic| panic_message(&*panic)))
-        .map_err(|message| panic_error(py, &message))
+    py.detach(|| {
+        catch_unwind(AssertUnwindSafe(work)).map_err(|panic| panic_message(&*panic).to_owned())
+    })
+    .map_err(|message| panic_error(py, &message))
 }
 
 /// The process in which an object was made. A forked process lacks the threads of
@@ -172,10 +173,4 @@ impl<T: Send> Shared<T> {
             Err(TryLockError::WouldBlock) => None,
         }
     }
-}
-
-pub fn panic_message(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied();
-    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    text.unwrap_or("no message").to_owned()
 }

@@ -29,6 +29,7 @@ from .errors import (
 from .evolution import (
     CMAES,
     GA,
+    NSGA2,
     PGPE,
     SNES,
     XNES,
@@ -55,7 +56,7 @@ __all__ = [
     "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "EvolutionError",
     "EvolutionWarning", "Experiment", "ExperimentError",
     "FINGERPRINT", "FleetError", "FleetRun", "FleetWarning", "ForkError", "GA", "Generation", "Individuals", "InternalError",
-    "Interrupted", "Judged", "LocalRun", "Measured", "Network", "NotFound", "OpenAIES", "Origin", "OtherExperimentError", "PGPE", "Problem", "RecordedRun", "RefusedArgument", "Replay", "SNES", "Selection",
+    "Interrupted", "Judged", "LocalRun", "Measured", "NSGA2", "Network", "NotFound", "OpenAIES", "Origin", "OtherExperimentError", "PGPE", "Problem", "RecordedRun", "RefusedArgument", "Replay", "SNES", "Selection",
     "SepCMAES", "SwarmError", "Trace", "TrialSet", "Verdict", "Workers", "XNES", "__version__", "algorithms", "connect", "evolve", "judge",
     "mirror", "open", "parallel_env", "workers",
 ]

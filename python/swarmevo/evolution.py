@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import warnings
 from dataclasses import dataclass
-from typing import Any, Callable, ClassVar, NamedTuple
+from typing import Any, Callable, ClassVar, NamedTuple, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +51,11 @@ class Evolution:
         """``n_genes``: d, at least 1. ``params``: as in experiment files; ``docs/keys.md``
         and :func:`algorithms` list them. Warns (``EvolutionWarning``) of a population too small to learn
         from."""
+        self._start(n_genes, population_size, seed, params, [])
+
+    def _start(
+        self, n_genes: int, population_size: int, seed: int, params: dict[str, float | str], minimised: list[bool]
+    ) -> None:
         if type(self) is Evolution:
             raise TypeError("use the class of an algorithm, such as SNES, or Experiment.evolution")
         n_genes = arguments.whole(n_genes, "n_genes", 0, arguments.SIZE_MAX)
@@ -58,12 +63,12 @@ class Evolution:
         seed = arguments.whole(seed, "seed")
         given = {key: arguments.parameter(value, key) for key, value in params.items()}
         try:
-            self._core = _core.Evolution(self.algorithm, n_genes, population_size, seed, given)
+            self._core = _core.Evolution(self.algorithm, n_genes, population_size, seed, given, minimised)
         except ValueError as error:
             raise ValueError(_with_hints(str(error), self.algorithm, given)) from None
         advice = _core.advice(self.algorithm, population_size)
         if advice is not None:
-            warnings.warn(f"population_size: {advice}", EvolutionWarning, stacklevel=2)
+            warnings.warn(f"population_size: {advice}", EvolutionWarning, stacklevel=3)
         self._trials = (CHAMPION_TRIALS, JUDGEMENT_TRIALS)
         self._origin: Origin | None = None
 
@@ -84,28 +89,40 @@ class Evolution:
         """The next generation's genotypes ``[P, d]``. A second call gives the same."""
         return self._core.ask()
 
-    def tell(self, fitness: ArrayLike) -> Generation:
+    def tell(self, fitness: ArrayLike, measures: ArrayLike | None = None) -> Generation:
         """Learns from the fitness of the genotypes that :meth:`ask` gave: ``[P]``, or
-        ``[P, T]`` for T trials of each, whose mean counts. Warns (``EvolutionWarning``) of what a
+        ``[P, T]`` for T trials of each, whose mean counts. ``measures``: ``[P, M]``, or ``[P, T, M]`` for
+        trials, the values of M aims or descriptors, for algorithms that learn from them, too. Warns (``EvolutionWarning``) of what a
         coordinator reports as notices: fitness that is not finite, or that is the same for all
         individuals in ten generations; a distribution that is a point, or far wider than the range
         of genes. Raises ``EvolutionError``, a ValueError, and stays unchanged where a coordinator's run fails:
         if no fitness is finite, or evolution cannot learn any more."""
-        told = self._tell(fitness)
+        told = self._tell(fitness, measures=measures)
         for notice in told.notices:
             warnings.warn(notice, EvolutionWarning, stacklevel=2)
         return told.generation
 
-    def _tell(self, fitness: ArrayLike, experiment: _core.Experiment | None = None) -> Told:
+    def _tell(
+        self, fitness: ArrayLike, experiment: _core.Experiment | None = None, measures: ArrayLike | None = None
+    ) -> Told:
         """``experiment``: the experiment of this run."""
         values = arguments.numbers(fitness, "fitness")
         if values.ndim == 1:
             values = values[:, np.newaxis]
         if values.ndim != 2:
             raise ValueError(f"fitness is an array [P] or [P, T], not {list(values.shape)}")
-        row, notices, completed = self._core.tell(values, experiment)
+        row, notices, completed = self._core.tell(values, experiment, _rows_of(measures, values.shape[1]))
         index, best, mean, least, deviation, n_non_finite = row
         return Told(Generation(index, best, mean, least, n_non_finite, self.digest, deviation), notices, completed)
+
+    def front(self) -> Front:
+        """The elites of a front so far: no individual dominates one of them by the mean of all trials that it
+        has met, which is optimistic where trials differ. Only for algorithms with several aims."""
+        found = self._core.front()
+        if found is None:
+            raise ValueError("the algorithm has no front; NSGA2 has one")
+        genotypes, values, born = found
+        return Front(genotypes, values[:, 0], values[:, 1:], born)
 
     def compare(self, evaluate: Evaluate, trials: int | None = None) -> Champion:
         """Compares the candidates for the champion on held-out trials, and makes the winner the champion.
@@ -213,6 +230,31 @@ class Told(NamedTuple):
     """The reason, if it is the last generation of a run; empty: all are done."""
 
 
+class Front(NamedTuple):
+    """Elites of which none is better than another one in fitness and all aims."""
+
+    genotypes: Floats
+    """``[N, d]``"""
+    fitness: Floats
+    """``[N]``"""
+    aims: Floats
+    """``[N, M]``"""
+    born: list[tuple[int, int]]
+    """The generation that first evaluated each, and its index there."""
+
+
+def _rows_of(measures: ArrayLike | None, n_trials: int) -> Floats | None:
+    """``[P, T M]``"""
+    if measures is None:
+        return None
+    values = arguments.numbers(measures, "measures")
+    if values.ndim == 2 and n_trials == 1:
+        return values
+    if values.ndim != 3 or values.shape[1] != n_trials:
+        raise ValueError(f"measures is an array [P, M] or [P, T, M], with T of the fitness, not {list(values.shape)}")
+    return values.reshape(len(values), -1)
+
+
 class Judgement(NamedTuple):
     """The outcome of the end of a run."""
 
@@ -283,6 +325,35 @@ class PGPE(Evolution):
     algorithm = "PGPE"
 
 
+class NSGA2(Evolution):
+    """Fronts of compromises between fitness, of which more is better, and one or two other aims.
+
+    >>> evolution = NSGA2(3, aims=["minimise"], population_size=20, seed=7)
+    >>> genotypes = evolution.ask()
+    >>> _ = evolution.tell(genotypes[:, 0], measures=genotypes[:, :1] ** 2)
+    >>> len(evolution.front().fitness)
+    20
+    """
+
+    algorithm = "NSGA-II"
+
+    def __init__(
+        self,
+        n_genes: int,
+        *,
+        aims: Sequence[str],
+        population_size: int = 20,
+        seed: int = 0,
+        **params: float | str,
+    ) -> None:
+        """``aims``: for each aim beside fitness ``"maximise"`` or ``"minimise"``. Everything else as for other
+        algorithms."""
+        if isinstance(aims, str) or not all(isinstance(aim, str) for aim in aims):
+            raise ValueError(f'aims is a list of "maximise" and "minimise", not {aims!r}')
+        arguments.known(aims, ["maximise", "minimise"], "direction")
+        self._start(n_genes, population_size, seed, params, [aim == "minimise" for aim in aims])
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of an algorithm."""
@@ -306,6 +377,6 @@ def algorithms() -> dict[str, list[Parameter]]:
 
 
 __all__ = [
-    "CMAES", "Champion", "Evolution", "GA", "Generation", "OpenAIES", "PGPE", "Parameter", "SNES",
+    "CMAES", "Champion", "Evolution", "Front", "GA", "Generation", "NSGA2", "OpenAIES", "PGPE", "Parameter", "SNES",
     "SepCMAES", "TrialSet", "XNES", "algorithms",
 ]

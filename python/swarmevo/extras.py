@@ -12,6 +12,7 @@ PACKAGES = {
     "fleet": ("grpc", "google"),
     "network": ("networkx",),
     "plot": ("matplotlib",),
+    "ribs": ("ribs",),
     "steps": ("gymnasium", "pettingzoo"),
 }
 """Imported packages, by the extra that installs them."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import arguments, protocol
+from .archives import to_ribs
 from .champion import Champion, Judged, Origin, Selection
 from .experiment import Experiment, config_text
 from .extras import needs
@@ -218,16 +219,63 @@ class RecordedRun:
         return Individuals(np.array(genotypes), np.array(fitness))
 
     def repertoire(self, generation: int | None = None) -> pandas.DataFrame:
-        """A row per elite that MAP-Elites or DNS keeps after a generation, by default the latest
+        """A row per elite of the repertoire after a generation, by default the latest
         one. ``shown`` marks the fittest of every cell. Means over the trials of its life are
         optimistic; those that begin with ``judged_`` are missing before the end of a run. ``attrs``
         has the axes of the grid, and the corrected figures."""
+        found = self._repertoire(generation)
+        names = [f"{axis.measure}_{axis.of}" for axis in found.axes]
+        elites = self._elites(found, names, has_cells=True)
+        elites.attrs["axes"] = {
+            name: {"range": (axis.low, axis.high), "cells": axis.cells} for name, axis in zip(names, found.axes)
+        }
+        if found.HasField("corrected"):
+            of = found.corrected
+            elites.attrs["corrected"] = {"qd_score": of.qd_score, "coverage": of.coverage, "stay": of.stay}
+        return elites
+
+    def to_ribs(self, generation: int | None = None) -> Any:
+        """The elites that `repertoire` marks as ``shown``, as a ``GridArchive`` of the package
+        ``ribs``, which draws it and continues with it. Objectives and measures are judged ones at the
+        end of a run, and before it those of the evidence. The field ``address`` leads back to the
+        individual."""
+        return to_ribs(self, lambda: self._repertoire(generation))
+
+    def _repertoire(self, generation: int | None) -> Any:
+        """The message ``GetRepertoireResponse``."""
+        chosen = {} if generation is None else {"generation": arguments.whole(generation, "generation")}
+        return self._records._call("GetRepertoire", experiment_id=self.id, **chosen)
+
+    def front(
+        self, generation: int | None = None, reference: Iterable[float] | None = None
+    ) -> pandas.DataFrame:
+        """A row per elite of the front that NSGA-II keeps after a generation, by default the latest
+        one. ``shown`` marks those that no other one dominates by judged values. Means over the trials
+        of a life are optimistic; those that begin with ``judged_`` are missing before the end of a run.
+        ``reference``: the point up to which the hypervolume counts, fitness and then each aim; by default the
+        worst of all elites, which differs from run to run. ``attrs`` has the directions of the aims, and
+        hypervolume, reference point and share of elites that stay on the front."""
+        chosen: dict[str, Any] = {}
+        if generation is not None:
+            chosen["generation"] = arguments.whole(generation, "generation")
+        if reference is not None:
+            chosen["reference"] = [float(it) for it in arguments.numbers(list(reference), "reference").ravel()]
+        found = self._records._call("GetFront", experiment_id=self.id, **chosen)
+        names = [f"{aim.measure}_{aim.of}" for aim in found.aims]
+        elites = self._elites(found, names, has_cells=False)
+        elites.attrs["aims"] = {name: aim.direction for name, aim in zip(names, found.aims)}
+        if found.HasField("figures"):
+            of = found.figures
+            elites.attrs["hypervolume"] = of.hypervolume
+            elites.attrs["reference"] = tuple(of.reference)
+            elites.attrs["stay"] = of.stay if of.HasField("stay") else None
+        return elites
+
+    def _elites(self, found: Any, names: list[str], *, has_cells: bool) -> pandas.DataFrame:
+        """A row per elite of a response; ``names``: of its descriptors or aims."""
         with needs("data"):
             import pandas
 
-        chosen = {} if generation is None else {"generation": arguments.whole(generation, "generation")}
-        found = self._records._call("GetRepertoire", experiment_id=self.id, **chosen)
-        names = [f"{axis.measure}_{axis.of}" for axis in found.axes]
         shown = set(found.shown)
 
         def row(place: int, elite: Any) -> dict[str, Any]:
@@ -237,21 +285,14 @@ class RecordedRun:
                 "shown": place in shown,
                 "trials": elite.trials,
                 "fitness": elite.fitness,
-                "cell": tuple(elite.cell),
+                **({"cell": tuple(elite.cell)} if has_cells else {}),
                 **dict(zip(names, elite.descriptors)),
                 "judged_fitness": judged.fitness if judged else np.nan,
-                "judged_cell": tuple(judged.cell) if judged else None,
+                **({"judged_cell": tuple(judged.cell) if judged else None} if has_cells else {}),
                 **{f"judged_{name}": judged.descriptors[i] if judged else np.nan for i, name in enumerate(names)},
             }
 
-        elites = pandas.DataFrame([row(*it) for it in enumerate(found.elites)])
-        elites.attrs["axes"] = {
-            name: {"range": (axis.low, axis.high), "cells": axis.cells} for name, axis in zip(names, found.axes)
-        }
-        if found.HasField("corrected"):
-            of = found.corrected
-            elites.attrs["corrected"] = {"qd_score": of.qd_score, "coverage": of.coverage, "stay": of.stay}
-        return elites
+        return pandas.DataFrame([row(*it) for it in enumerate(found.elites)])
 
     def fitness(self, generation: int) -> Floats:
         """``[P, T]``: the fitness of a generation that evolution used, without its genotypes."""

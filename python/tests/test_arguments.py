@@ -88,6 +88,10 @@ CASES = {
                    swarmevo.PGPE)
         for key in ("n_genes", "population_size", "seed")
     },
+    **{
+        f"NSGA2.{key}": lambda value, key=key: swarmevo.NSGA2(**{"n_genes": 3, "aims": ["minimise"], key: value})
+        for key in ("n_genes", "population_size", "seed")
+    },
     "Evolution.compare.trials": lambda it: evolved().compare(QUICK.fitness, it),
     "Evolution.judge.trials": lambda it: evolved().judge(QUICK.fitness, it),
     "evolve.generations": lambda it: swarmevo.evolve(QUICK, it, progress=False, evaluate=lambda g, s, t: np.zeros(len(g))),
@@ -122,6 +126,8 @@ CASES = {
             "individuals.generation": lambda run, it: run.individuals(it),
             "fitness.generation": lambda run, it: run.fitness(it),
             "repertoire.generation": lambda run, it: run.repertoire(it),
+            "to_ribs.generation": lambda run, it: run.to_ribs(it),
+            "front.generation": lambda run, it: run.front(it),
         }.items()
     },
     "analysis.ablation.trials": lambda it: analysis.ablation(QUICK, GENES, "groups", trials=it),
@@ -189,7 +195,7 @@ def test_no_number_is_forgotten():
     """The table contains every argument that is annotated as a whole number."""
     named = {f"{owner}.{key}".removeprefix("swarmevo.") for owner, key in numbers()}
     inherited = {f"{it.__name__}.{name}" for it in (swarmevo.GA, swarmevo.SNES, swarmevo.XNES, swarmevo.CMAES,
-                                                      swarmevo.SepCMAES, swarmevo.OpenAIES, swarmevo.PGPE) for name in ("compare", "judge")}
+                                                      swarmevo.SepCMAES, swarmevo.OpenAIES, swarmevo.PGPE, swarmevo.NSGA2) for name in ("compare", "judge")}
     left = {it for it in named - CASES.keys() if it.rpartition(".")[0] not in inherited}
     # Leaves out results, which only the package makes; inherited members; and members that are
     # tested under another name.
@@ -198,7 +204,7 @@ def test_no_number_is_forgotten():
     assert left <= {"Evolution.n_genes", "Evolution.population_size", "Evolution.seed", "RecordedRun.experiment_id",
                     "FleetRun.experiment_id", "RecordedRun.fitness_log.generations", "FleetRun.fitness_log.generations",
                     "Trace.where", "Episodes.where", *(f"FleetRun.{it}" for it in (
-                        "individual.generation", "individual.index", "mean.generation", "individuals.generation", "fitness.generation", "repertoire.generation"))} | {
+                        "individual.generation", "individual.index", "mean.generation", "individuals.generation", "fitness.generation", "repertoire.generation", "to_ribs.generation", "front.generation"))} | {
         it for it in left if it.startswith("analysis.") and inspect.isclass(getattr(analysis, it.split(".")[1])) and it.count(".") == 2
     }, left
 

@@ -55,6 +55,7 @@ def names_of_the_page(**more):
     genotypes = np.random.default_rng(3).random((4, experiment.n_genes))
     return {
         "swarmevo": swarmevo, "np": np, "genotypes": genotypes, "genotype": genotypes[0], "experiment": experiment,
+        "reward": lambda genotypes: np.mean(genotypes, axis=1), "cost": lambda genotypes: np.sum(genotypes**2, axis=1),
         "my_function": lambda genotypes: -np.sum((genotypes - 0.3) ** 2, axis=1), **more,
     }
 

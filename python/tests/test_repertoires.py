@@ -4,6 +4,7 @@ import json
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import swarmevo
@@ -70,3 +71,37 @@ def test_other_runs_have_none(tmp_path):
     recorded = swarmevo.evolve(quick, progress=False, data_dir=tmp_path)
     with pytest.raises(swarmevo.RefusedArgument, match="SNES evolves none"):
         swarmevo.open(tmp_path).run(recorded.id).repertoire()
+
+
+def test_ribs_has_the_same_cells_the_same_worth_and_draws_them(run):
+    for package in ("pandas", "ribs"):
+        pytest.importorskip(package)
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    from ribs.visualize import grid_archive_heatmap
+
+    elites = run.repertoire()
+    archive = run.to_ribs()
+    corrected, shown = elites.attrs["corrected"], elites[elites["shown"]]
+    assert archive.stats.coverage == pytest.approx(corrected["coverage"])
+    assert archive.stats.qd_score == pytest.approx(corrected["qd_score"])
+    assert list(archive.dims) == [axis["cells"] for axis in elites.attrs["axes"].values()]
+    kept = archive.data(return_type="dict")
+    cells = map(tuple, archive.int_to_grid_index(kept["index"]))
+    assert dict(zip(kept["address"], cells)) == dict(zip(shown["address"], shown["judged_cell"]))
+    for address, genotype in zip(kept["address"][:3], kept["solution"]):
+        generation, individual = map(int, address.split("@")[1].split("/"))
+        assert np.array_equal(run.individual(generation, individual).genotype, genotype)
+    grid_archive_heatmap(archive)
+    assert pyplot.gcf().axes
+    pyplot.close("all")
+
+
+def test_before_the_end_ribs_has_the_evidence(run):
+    for package in ("pandas", "ribs"):
+        pytest.importorskip(package)
+    elites = run.repertoire(1)
+    shown = elites[elites["shown"]]
+    kept = run.to_ribs(1).data(return_type="dict")
+    assert dict(zip(kept["address"], kept["objective"])) == dict(zip(shown["address"], shown["fitness"]))

@@ -145,6 +145,7 @@ MISSING = {
     "fleet": ["import swarmevo; swarmevo.connect()", "import swarmevo; swarmevo.open({data!r}).runs()"],
     "network": ["experiment.network(run.champion).to_networkx()"],
     "plot": ["run.plot()", "from swarmevo.analysis import report; report(experiment, run.champion, {data!r} + '/report', trials=2)"],
+    "ribs": ["swarmevo.open({data!r}).run(1).to_ribs()"],
     "steps": ["swarmevo.parallel_env(experiment)"],
     "analysis": ["from swarmevo.analysis import alpha_shape; import numpy as np; alpha_shape(np.random.rand(9, 2), 1.0)"],
 }

@@ -7,7 +7,7 @@ import hmac
 import ipaddress
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Awaitable, Callable, Sequence
+from typing import TYPE_CHECKING, Any, Sequence
 
 from ..extras import needs
 from ..settings import Settings

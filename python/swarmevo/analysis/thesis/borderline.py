@@ -12,7 +12,7 @@ from ..channel import FIRST, sectors_heard
 from ..drawing import COLOURS, OFF, ON, bands, bars, canvas, in_one_piece, raster, swarm
 from ..proportions import Proportion, conditional
 from .champion import REACH, Champion, Floats
-from .common import evolution, snapshots
+from .common import evolution, snapshots, without_inputs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -105,18 +105,7 @@ def fig_17(champion: Champion) -> Figure:
 
 def fig_18(champion: Champion) -> Figure:
     """Accuracy without single inputs."""
-    inputs = {
-        "all inputs": None,
-        "no message": "wireless_receiver:msg",
-        "no direction": "wireless_receiver:receiving_direction",
-        "no mode": "wireless_receiver:state",
-    }
-    return _accuracy(
-        {
-            label: champion.measure(**({} if sensor is None else {"without": sensor})).measures["accuracy"]
-            for label, sensor in inputs.items()
-        }
-    )
+    return _accuracy({label: found["accuracy"] for label, found in without_inputs(champion).items()})
 
 
 def fig_19(champion: Champion) -> Figure:

@@ -35,6 +35,14 @@ def evolution(champion: Champion) -> Figure:
     return figure
 
 
+def without_inputs(champion: Champion, *more: str, **changes: Any) -> dict[str, dict[str, Floats]]:
+    """Measures with all inputs and without single ones, ``more`` among them."""
+    labels = {"message": "msg", "direction": "receiving_direction", **{name: name for name in more}, "mode": "state"}
+    lesions = {f"no {label}": {"without": f"wireless_receiver:{name}"} for label, name in labels.items()}
+    conditions = {"all inputs": {}, **lesions}
+    return {label: champion.measure(**changes, **lesion).measures for label, lesion in conditions.items()}
+
+
 def snapshots(
     champion: Champion,
     trace: Trace,

@@ -12,7 +12,7 @@ from ..channel import FIRST, symbols
 from ..drawing import COLOURS, ON, bars, boxes, canvas, in_one_piece, raster, swarm
 from ..proportions import Proportion, conditional
 from .champion import REACH, Champion, mean_of_trials
-from .common import evolution, snapshots
+from .common import evolution, snapshots, without_inputs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,18 +75,9 @@ def fig_7(champion: Champion) -> Figure:
 
 def fig_8(champion: Champion) -> Figure:
     """Share of time with one leader, without single inputs."""
-    inputs = {
-        "all inputs": None,
-        "no message": "wireless_receiver:msg",
-        "no direction": "wireless_receiver:receiving_direction",
-        "no mode": "wireless_receiver:state",
-    }
     figure, axis = canvas(5, 2.9)
-    found = [
-        champion.measure(perturbations={}, **({} if sensor is None else {"without": sensor})).measures["one_leader"]
-        for sensor in inputs.values()
-    ]
-    bars(axis, list(inputs), [mean_of_trials(it.mean(axis=1)) for it in found])
+    found = without_inputs(champion, perturbations={})
+    bars(axis, list(found), [mean_of_trials(it["one_leader"].mean(axis=1)) for it in found.values()])
     axis.set_ylabel("% of the time with one leader")
     return figure
 

@@ -13,12 +13,11 @@ from ...experiment import Experiment
 from ...trace import Trace
 from ...trials import TrialSet
 from ..channel import FIRST
-from ..drawing import COLOURS, OFF, ON, bands, boxes, canvas
+from ..drawing import COLOURS, ON, bands, boxes, canvas
 from .champion import Champion, Floats
-from .common import histories, snapshots
+from .common import histories, snapshots, without_inputs
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SIZES = (5, 10, 15, 20)
@@ -108,19 +107,7 @@ def fig_35(champion: Champion) -> Figure:
 
 def fig_36(champion: Champion) -> Figure:
     """Distances to the light without single inputs."""
-    inputs = {
-        "all inputs": None,
-        "no message": "wireless_receiver:msg",
-        "no direction": "wireless_receiver:receiving_direction",
-        "no signal": "wireless_receiver:signal",
-        "no mode": "wireless_receiver:state",
-    }
-    return _both(
-        {
-            label: champion.measure(**({} if sensor is None else {"without": sensor})).measures
-            for label, sensor in inputs.items()
-        }
-    )
+    return _both(without_inputs(champion, "signal"))
 
 
 def fig_37(champion: Champion) -> Figure:
