@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Evolves an experiment by every algorithm, each with its default parameters and the same budget.
+"""Evolves an experiment by every algorithm for a single optimum, each with its default parameters and the same budget.
 
     results/algorithms.py NAME [--generations G] [--seeds S...] [--algorithms A...] [--workers N]
 

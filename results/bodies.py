@@ -17,14 +17,13 @@ import csv
 import json
 import resource
 import statistics
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import algorithms
 from hypotheses import changed
-from report import LAST, RESULTS, markdown, print_or_update, read_csv
+from report import LAST, RESULTS, evaluated, markdown, middle, print_or_update, read_csv
 
 PAGE = RESULTS.parent / "docs" / "bodies.md"
 TABLE = RESULTS / "bodies.csv"
@@ -111,26 +110,15 @@ def evaluate(task, changes, champion):
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / f"{task}.json"
         config.write_text(json.dumps(changed(experiment, changes)))
-        subprocess.run(["swarmctl", "evaluate", "--local", "--workers", "1", "--config", config, "--genotype", champion,
-                        "--changed-conditions", "--trials", str(TRIALS), "--to", f"{folder}/to"],
-                       check=True, stdout=subprocess.DEVNULL)
-        summary = json.loads((Path(folder) / "to" / "summary.json").read_text())
-    return summary["conditions"][0]["fitness"]
-
-
-def cell(rows):
-    """The median champion with its interval, then the least and the greatest."""
-    rows = sorted(rows, key=lambda row: float(row["fitness"]))
-    mean, low, high = (float(rows[(len(rows) - 1) // 2][key]) for key in ("fitness", "low", "high"))
-    return f"{mean:.3f} ({low:.3f} to {high:.3f}); {float(rows[0]['fitness']):.3f} to {float(rows[-1]['fitness']):.3f}"
+        return evaluated(config, champion, TRIALS, f"{folder}/to")["conditions"][0]["fitness"]
 
 
 def table():
     rows = read_csv(TABLE)
     kinds = [(name, task, "points") for name, task, _ in TASKS] + [("D, evolved with bodies", D[0], "bodies")]
     return markdown(["", *CONDITIONS], (
-        [name, *(cell([row for row in rows
-                       if (row["task"], row["evolved_as"], row["condition"]) == (task, evolved_as, condition)])
+        [name, *(middle([[float(row[key]) for key in ("fitness", "low", "high")] for row in rows
+                         if (row["task"], row["evolved_as"], row["condition"]) == (task, evolved_as, condition)])
                  for condition in CONDITIONS)]
         for name, task, evolved_as in kinds))
 

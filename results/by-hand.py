@@ -20,12 +20,12 @@ import itertools
 import json
 import math
 import re
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-RESULTS = Path(__file__).resolve().parent
+from report import RESULTS, evaluated, interval, read_csv
+
 TASKS = RESULTS.parent / "configs" / "tasks"
 TABLE = RESULTS / "by-hand.csv"
 COLUMNS = ["task", "controller", "trials", "fitness", "fitness_low", "fitness_high", "solved", "solved_low", "solved_high"]
@@ -37,12 +37,8 @@ FITNESS = {"dispersion": 0.75}
 def evaluation(task, config, champion, trials, options=()):
     """Fitness and share of solved steps or trials, each a mean with its interval."""
     with tempfile.TemporaryDirectory() as folder:
-        command = ["swarmctl", "evaluate", "--local", "--workers", "1", "--config", config, "--genotype", champion,
-                   "--changed-conditions", "--trials", str(trials), "--to", folder, "--force", *options]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        condition = json.loads((Path(folder) / "summary.json").read_text())["conditions"][0]
-        with (Path(folder) / "trials.csv").open(newline="") as file:
-            fitness = [float(row["time_mean"]) for row in csv.DictReader(file) if row["metric"] == "fitness"]
+        condition = evaluated(config, champion, trials, folder, "--force", *options)["conditions"][0]
+        fitness = [float(row["time_mean"]) for row in read_csv(Path(folder) / "trials.csv") if row["metric"] == "fitness"]
     means = [condition["fitness"]["mean"], *condition["fitness"]["ci95"]]
     if task in FITNESS:
         share = sum(value >= FITNESS[task] for value in fitness) / trials
@@ -81,10 +77,6 @@ def compared(task, trials):
         yield BY_HAND, evaluation(task, by_hand(task, folder), champions(task)[0], trials)
 
 
-def estimate(mean, low, high):
-    return f"{mean:.2f} ({low:.2f} to {high:.2f})"
-
-
 def record(task, rows, trials):
     """Replaces the rows of a task in the file."""
     kept = []
@@ -108,7 +100,7 @@ def tune(task, trials, grid):
             tried.append((evaluation(task, config, champions(task)[0], trials, ["--base", "seed=1000"]), constants))
     print("| fitness | solved | constants |\n|---|---|---|")
     for values, constants in sorted(tried, reverse=True)[:5]:
-        print(f"| {estimate(*values[:3])} | {estimate(*values[3:])} | {', '.join(map(' = '.join, constants))} |")
+        print(f"| {interval(*values[:3], 2)} | {interval(*values[3:], 2)} | {', '.join(map(' = '.join, constants))} |")
 
 
 def main():
@@ -127,7 +119,7 @@ def main():
         rows = []
         for controller, values in compared(task, args.trials):
             rows.append((controller, values))
-            print(f"| {task} | {controller} | {estimate(*values[:3])} | {estimate(*values[3:])} |", flush=True)
+            print(f"| {task} | {controller} | {interval(*values[:3], 2)} | {interval(*values[3:], 2)} |", flush=True)
         if args.record:
             record(task, rows, args.trials)
 

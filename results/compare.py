@@ -8,9 +8,8 @@ all seeds, run results/fetch before. Needs swarmctl in the PATH, Python 3.9 and 
 """
 
 import json
-import subprocess
 
-from report import RESULTS, table
+from report import RESULTS, spread, swarmctl, table
 
 TASKS = {
     "A": "leader_selection",
@@ -23,19 +22,13 @@ QUANTITIES = {"judged": "champion", "mean": "mean, last 50", "best": "best, last
 
 
 def compared(task):
-    """The output of `swarmctl compare` for a task; None without runs by both algorithms."""
+    """The output of `swarmctl compare` for a task; an empty list without runs by both algorithms."""
     files = [sorted((RESULTS / folder).glob(f"{task}_{algorithm}-*"))
              for algorithm in ("ga", "snes") for folder in ("histories", "champions")]
     if not all(files):
         return []
-    command = ["swarmctl", "compare", "--output", "json", *sum(files, [])]
-    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-    return [it for it in json.loads(done.stdout)["quantities"] if it["name"] in QUANTITIES]
-
-
-def cell(sample):
-    values = sample["values"]
-    return f"{sample['median']['value']:.3f} ({min(values):.3f} to {max(values):.3f})"
+    found = json.loads(swarmctl("compare", "--output", "json", *sum(files, [])))
+    return [it for it in found["quantities"] if it["name"] in QUANTITIES]
 
 
 def main():
@@ -44,7 +37,7 @@ def main():
         for quantity in compared(name):
             ga, snes = quantity["samples"]
             pair = quantity["pairs"][0]
-            rows.append([task, f"{len(ga['values'])}, {len(snes['values'])}", QUANTITIES[quantity["name"]], cell(ga), cell(snes),
+            rows.append([task, f"{len(ga['values'])}, {len(snes['values'])}", QUANTITIES[quantity["name"]], spread(ga["values"]), spread(snes["values"]),
                          f"{pair['probability_of_improvement']['value']:.2f}", f"{pair['p']:.2f}"])
     table(["task", "runs", "of fitness", "GA", "SNES", "GA's is better", "p"], rows)
 

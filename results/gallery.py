@@ -8,10 +8,9 @@ A task is solved by a seed if its champion is in a solved state, which the task'
 the last third of the episodes, on average over all trials. Needs Python 3.9 and nothing else.
 """
 
-import csv
 import statistics
 
-from report import RESULTS, markdown, print_or_update, read_csv
+from report import RESULTS, interval, markdown, middle, print_or_update, read_csv
 
 PAGE = RESULTS.parent / "docs" / "gallery.md"
 ORDER = [
@@ -19,17 +18,12 @@ ORDER = [
     "transport", "slalom", "gather", "harvest", "maze", "cluster",
 ]
 ENOUGH = 0.8
+KEYS = ("solved", "fitness")
 HEAD = ["task", "seeds that solve it", "share solved", "fitness", "minutes", "share solved by hand", "fitness by hand"]
 
 
 def estimate(row, key):
-    return f"{float(row[key]):.3f} ({float(row[key + '_low']):.3f} to {float(row[key + '_high']):.3f})"
-
-
-def middle(rows, key):
-    """The median champion with its interval, then the least and the greatest."""
-    rows = sorted(rows, key=lambda row: float(row[key]))
-    return f"{estimate(rows[(len(rows) - 1) // 2], key)}; {float(rows[0][key]):.3f} to {float(rows[-1][key]):.3f}"
+    return [float(row[column]) for column in (key, f"{key}_low", f"{key}_high")]
 
 
 def minutes(task, seed):
@@ -42,13 +36,12 @@ def line(task, rows):
     evolved = [row for row in rows if row is not hand]
     solving = [row for row in evolved if float(row["solved"]) >= ENOUGH]
     times = [minutes(task, row["controller"].split()[1]) for row in evolved]
-    return [task, f"{len(solving)} of {len(evolved)}", middle(evolved, "solved"), middle(evolved, "fitness"),
-            f"{statistics.median(times):.1f}", estimate(hand, "solved"), estimate(hand, "fitness")]
+    return [task, f"{len(solving)} of {len(evolved)}", *(middle([estimate(row, key) for row in evolved]) for key in KEYS),
+            f"{statistics.median(times):.1f}", *(interval(*estimate(hand, key)) for key in KEYS)]
 
 
 def table():
-    with (RESULTS / "by-hand.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(RESULTS / "by-hand.csv")
     return markdown(HEAD, (line(task, [row for row in rows if row["task"] == task]) for task in ORDER))
 
 

@@ -13,13 +13,12 @@ results/histories. Needs Python 3.9, and for `run` swarmctl in the PATH.
 
 import argparse
 import copy
-import csv
 import json
 import statistics
 from pathlib import Path
 
 import algorithms
-from report import LAST, RESULTS, markdown, print_or_update
+from report import LAST, RESULTS, markdown, print_or_update, read_csv, spread
 
 PAGE = RESULTS.parent / "docs" / "notebook" / "2026-11-thesis.md"
 SEEDS = [0, 1, 2, 3, 4]
@@ -154,14 +153,8 @@ def read(name, variant, seed):
         history, champion = Path(f"{stem}.csv"), Path(f"{stem}.json")
     if not champion.exists():
         return None
-    with history.open(newline="") as stream:
-        means = [float(row["mean"]) for row in csv.DictReader(stream)]
+    means = [float(row["mean"]) for row in read_csv(history)]
     return statistics.mean(means[-LAST:]), json.loads(champion.read_text())["judged"]["mean"]
-
-
-def spread(values):
-    """Median, least and greatest."""
-    return f"{statistics.median(values):.3f} ({min(values):.3f} to {max(values):.3f})"
 
 
 if __name__ == "__main__":

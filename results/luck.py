@@ -21,7 +21,8 @@ from math import log
 from pathlib import Path
 from statistics import fmean, median
 
-RESULTS = Path(__file__).resolve().parent
+from report import RESULTS
+
 NAMES = ["leader_selection_ga-0", "borderline_snes-0", "orientation_consensus_snes-0", "light_follower_snes-0"]
 N_BLOCKS = 20
 

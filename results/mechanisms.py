@@ -10,16 +10,14 @@ Needs swarmctl in the PATH, Python 3.9 and nothing else.
 """
 
 import argparse
-import csv
 import json
 import math
 import statistics
-import subprocess
 import tempfile
 from collections import Counter, defaultdict
 from pathlib import Path
 
-from report import RESULTS, table
+from report import RESULTS, read_csv, swarmctl, table
 
 WINDOW = 10  # number of steps over which heard sectors are counted
 
@@ -210,11 +208,9 @@ def following(rows, stimuli):
 def simulated(path, config, n_trials):
     with tempfile.TemporaryDirectory() as scratch:
         trace = Path(scratch) / "trace.csv"
-        command = ["swarmctl", "simulate", config, "--genotype", path, "--trace", trace,
-                   "--trace-columns", "targets", "--generation", "1000000", "--trials", str(n_trials)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        with open(trace, newline="") as file:
-            return list(csv.DictReader(file))
+        swarmctl("simulate", config, "--genotype", path, "--trace", trace, "--trace-columns", "targets",
+                 "--generation", 1000000, "--trials", n_trials)
+        return read_csv(trace)
 
 
 def main():

@@ -13,21 +13,20 @@ the PATH; they take about 20 and 5 minutes of one core. Needs Python 3.9.
 import csv
 import json
 import statistics
-import subprocess
 import sys
 import tempfile
 from itertools import combinations
 from pathlib import Path
 
 from hypotheses import changed
-from report import RESULTS, markdown, print_or_update, read_csv
+from report import RESULTS, evaluated, interval, markdown, print_or_update, read_csv, swarmctl
 
 PAGE = RESULTS.parent / "docs" / "robots.md"
 TABLE = RESULTS / "realities.csv"
 RANKS = RESULTS / "realities-ranks.csv"
 EVOLVED = RESULTS / "realities-evolved.csv"
 CONFIGS = RESULTS.parent / "configs"
-REALITIES, TRIALS = "30", "50"
+REALITIES, TRIALS = 30, 50
 # The name of a file, and what the page calls it.
 TASKS = {
     "leader_selection_snes": "A, leader selection",
@@ -42,15 +41,10 @@ GENERATIONS = 300
 SEEDS = range(5)
 
 
-def swarmctl(*arguments):
-    return subprocess.run(["swarmctl", *arguments], check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL).stdout
-
-
 def assess(config, champion, to):
     """What realities cost a champion."""
-    swarmctl("evaluate", "--local", "--workers", "1", "--config", config, "--genotype", champion, "--changed-conditions",
-             "--trials", TRIALS, "--pseudo-realities", REALITIES, "--every", "1000", "--to", to)
-    return json.loads((Path(to) / "summary.json").read_text())["pseudo_realities"]
+    options = ["--pseudo-realities", REALITIES, "--every", 1000]
+    return evaluated(config, champion, TRIALS, to, *options)["pseudo_realities"]
 
 
 def rows_of(found):
@@ -105,7 +99,7 @@ def evolve():
             config.write_text(json.dumps(changed(experiment, changes)))
             for seed in SEEDS:
                 data = Path(folder) / f"{evolved}-{seed}"
-                swarmctl("run", config, "--seed", str(seed), "--workers", "1", "--data-dir", data)
+                swarmctl("run", config, "--seed", seed, "--workers", 1, "--data-dir", data)
                 [champion] = data.glob("*.champion.json")
                 found = assess(judge, champion, data / "realities")
                 table.writerows([evolved, seed, *row] for row in rows_of(found))
@@ -117,7 +111,7 @@ def number(row, key):
 
 
 def drop(row):
-    return f"{number(row, 'drop'):.3f} ({number(row, 'low'):.3f} to {number(row, 'high'):.3f})"
+    return interval(*(number(row, key) for key in ("drop", "low", "high")))
 
 
 def of_champions():

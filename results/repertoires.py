@@ -9,20 +9,14 @@ Needs `swarmctl` on the path, Python 3.9 and nothing else.
 """
 
 import json
-import pathlib
-import subprocess
 import sys
 import tempfile
 
-from report import RESULTS, markdown, print_or_update
+from report import RESULTS, markdown, print_or_update, swarmctl
 
 DOCS = RESULTS.parent / "docs"
 NAMES = ["flocking", "foraging"]
 HEAD = ["repertoire", "descriptors", "elites", "QD score", "coverage", "stay in their cell"]
-
-
-def swarmctl(*args):
-    return subprocess.run(["swarmctl", *map(str, args)], check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
 def evolve(name, bundle):

@@ -11,6 +11,7 @@ import csv
 import json
 import math
 import statistics
+import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -45,9 +46,37 @@ def number(value, digits=3):
     return "" if value is None else f"{value:.{digits}f}"
 
 
+def interval(value, low, high, digits=3):
+    return f"{value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def spread(values, digits=3):
+    """The median, then the least and the greatest of several values."""
+    median = statistics.median(values)
+    return interval(median, min(values), max(values), digits) if len(values) > 1 else number(median, digits)
+
+
+def middle(estimates):
+    """Of values with their intervals: the median one, then the least and the greatest value."""
+    ordered = sorted(estimates, key=lambda estimate: estimate[0])
+    return f"{interval(*ordered[(len(ordered) - 1) // 2])}; {ordered[0][0]:.3f} to {ordered[-1][0]:.3f}"
+
+
 def read_csv(path):
     with open(path, newline="") as file:
         return list(csv.DictReader(file))
+
+
+def swarmctl(*args):
+    """What a command prints."""
+    return subprocess.run(["swarmctl", *map(str, args)], check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def evaluated(config, champion, trials, to, *options):
+    """The summary of the evaluation of a champion, whose files are written into the folder `to`."""
+    swarmctl("evaluate", "--local", "--workers", 1, "--config", config, "--genotype", champion, "--changed-conditions",
+             "--trials", trials, "--to", to, *options)
+    return json.loads((Path(to) / "summary.json").read_text())
 
 
 def print_or_update(page, name, text):
@@ -71,7 +100,7 @@ def runs(folder):
         judged, selected = champion.get("judged"), champion.get("held_out")
         worth = ""
         if judged:
-            worth = f"{judged['mean']:.3f} ({judged['ci95'][0]:.3f} to {judged['ci95'][1]:.3f})"
+            worth = interval(judged["mean"], *judged["ci95"])
         elif selected:
             worth = f"{selected['mean']:.3f} ± {selected['ci95']:.3f}, selected"
         first = lambda key, least: next(
@@ -187,7 +216,7 @@ def errors(folder, trials):
 def estimate(values, digits=3):
     """The mean of values with its 95 % interval, by the normal distribution."""
     mean, error = statistics.fmean(values), 1.96 * statistics.stdev(values) / len(values) ** 0.5
-    return f"{mean:.{digits}f} ({mean - error:.{digits}f} to {mean + error:.{digits}f})"
+    return interval(mean, mean - error, mean + error, digits)
 
 
 def lost_lights(folder):

@@ -12,7 +12,7 @@ over all runs. Readings without runs in results/ have no row. Needs Python 3.9 a
 import json
 import statistics
 
-from report import LAST, RESULTS, markdown, print_or_update, read_csv
+from report import LAST, RESULTS, markdown, print_or_update, read_csv, spread
 
 PAGE = RESULTS.parent / "docs" / "reproduction.md"
 # Experiment, reading, algorithm, and the name of the experiment file.
@@ -38,13 +38,8 @@ READINGS = [
 ]
 
 
-def spread(values):
-    """The range of several values."""
-    return f" ({min(values):.3f} to {max(values):.3f})" if len(values) > 1 else ""
-
-
 def row(experiment, reading, algorithm, name):
-    """The row of the table, as a list; an empty one without runs."""
+    """A list with the row of the table; empty without runs."""
     stems = sorted(path.stem for path in (RESULTS / "champions").glob(f"{name}-*.json"))
     if not stems:
         return []
@@ -54,14 +49,15 @@ def row(experiment, reading, algorithm, name):
     worths = sorted(champions, key=lambda it: it["mean"])
     middle = worths[(len(worths) - 1) // 2]
     worth = f"{middle['mean']:.3f}, 95 % {middle['ci95'][0]:.3f} to {middle['ci95'][1]:.3f}"
+    among = f" ({worths[0]['mean']:.3f} to {worths[-1]['mean']:.3f})" if len(worths) > 1 else ""
     cells = [
         experiment,
         reading,
         algorithm,
         len(stems),
         len(histories[0]),
-        f"{statistics.median(means):.3f}{spread(means)}",
-        f"{worth}{spread([it['mean'] for it in worths])}",
+        spread(means),
+        worth + among,
     ]
     return [cells]
 
