@@ -148,8 +148,12 @@ async fn evaluations_that_wait_take_no_more_memory_than_they_may() {
     }
 }
 
-/// Memory of a debug build's coordinator outside the counted budgets, MiB.
-const PROGRAM_MIB: u64 = 150;
+/// Memory of a debug build's coordinator outside the counted budgets, MiB: 120 to 150 on an idle
+/// machine, and 203 on one whose cores compiled and evolved. There, more threads hold decoded and
+/// freed memory at the same time. Without budgets, a hundred evaluations of 7 MB would add 700.
+const PROGRAM_MIB: u64 = 300;
+/// What a hundred connections may send before the coordinator reads it, 256 KiB each, MiB.
+const WINDOWS_MIB: u64 = 25;
 
 /// Sends the same evaluation on separate connections at the same time, and holds the answers.
 async fn evaluate_at_once(
@@ -185,7 +189,7 @@ async fn a_hundred_evaluations_at_once_stay_within_what_is_stated() {
     }
     // The waiting evaluations, and the incoming messages.
     let peak = coordinator.process.peak_memory_mib();
-    assert!(peak < 256 + 128 + PROGRAM_MIB, "{peak} MiB");
+    assert!(peak < 256 + 128 + WINDOWS_MIB + PROGRAM_MIB, "{peak} MiB");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -13,6 +13,28 @@ fn run_embedded(experiment: &Experiment, n_workers: usize, extra: &[&str]) -> Ve
     swarmctl(args).expect_success().json_lines()
 }
 
+/// A run with descriptors or aims has the same bits alone and on a fleet that is killed and
+/// audited, and both a single process and that fleet verify it.
+pub fn assert_same_bits_through_kills(experiment: &Experiment, what: &str) {
+    let expected = run_embedded(experiment, 1, &[]).pop().unwrap();
+    let mut coordinator = CoordinatorProcess::start_with(&["--audit-fraction", "1"]);
+    let mut workers = WorkerProcess::start_many(&coordinator, 3);
+    let watch = coordinator.watch(coordinator.submit(&experiment.path()));
+    coordinator.wait_for_generation(1);
+    workers.pop();
+    coordinator.process.kill();
+    coordinator.restart();
+    let found = watch.finish();
+    assert_eq!(found.last["digest"], expected["digest"], "{what}");
+    assert_eq!(found.last["champion"]["genotype"], expected["champion"]["genotype"], "{what}");
+    let directory = tempfile::tempdir().unwrap();
+    let bundle = directory.path().join("run.zip");
+    let bundle = bundle.to_str().unwrap();
+    coordinator.swarmctl(&["export", "1", "--to", bundle]).expect_success();
+    swarmctl(["verify", bundle, "--generations", "all"]).expect_success();
+    coordinator.swarmctl(&["verify", bundle, "--generations", "all"]).expect_success();
+}
+
 /// The lines, without values that depend on the clock.
 fn timeless(lines: &[Value]) -> Vec<Value> {
     let mut lines = lines.to_vec();

@@ -13,6 +13,7 @@ mod explain;
 mod faults;
 mod file_kinds;
 mod forks;
+mod fronts;
 mod groups;
 mod health;
 mod individuals;

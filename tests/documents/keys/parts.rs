@@ -181,6 +181,7 @@ const EVOLUTION: &[Section] = &[
     at("algorithm.fitness_function", &[("FitnessFunction", "")]),
     at("algorithm.fitness_params", &[("FitnessParams", "")]),
     at("algorithm.descriptors", &[("DescriptorConfig", "")]),
+    at("algorithm.aims", &[("AimConfig", "")]),
     at("algorithm.populations.NAME", &[("PopulationConfig", "")]),
     apart("algorithm.populations.NAME.params", &[("PopulationConfig/properties/params/anyOf", "")]),
 ];
