@@ -24,8 +24,8 @@ PYTHON = ["python/swarmevo/__init__.py", "python/swarmevo/analysis/__init__.py"]
 FAULTS = "tests/fleet/faults"
 # Where else faults are caused.
 OTHER_FAULTS = [
-    "coordinator/tests/api/engine/proof.rs",
-    "coordinator/tests/api/engine/trouble.rs",
+    "crates/engine/tests/fleets/proof.rs",
+    "crates/engine/tests/fleets/trouble.rs",
     "coordinator/tests/api/referee.rs",
     "coordinator/tests/api/hostile_workers.rs",
     "coordinator/tests/api/hostile_clients.rs",
