@@ -5,9 +5,9 @@
 //! which the test among these files compares every bit.
 //!
 //! `rate` and `spiking` write the neurons, `plastic` their learning, `encoding` the encoders,
-//! `decoding` the decisions, `radio` the radio, `interface` the header, `trial` the test; the folder
-//! `c` has the functions that do not depend on the network. `names` and `literals` turn names and
-//! numbers into text of C.
+//! `decoding` the decisions, `radio` the radio, `interface` the header, `trial` the test; the
+//! folder `c` has the functions that do not depend on the network. `names` and `literals` turn
+//! names and numbers into text of C.
 
 mod controller;
 mod decoding;

@@ -149,11 +149,6 @@ impl Program {
         self.functions.iter().position(|function| function.name == name).map(FunctionId)
     }
 
-    /// Names of all functions, in the order of the text.
-    pub fn function_names(&self) -> impl Iterator<Item = &str> {
-        self.functions.iter().map(|function| function.name.as_str())
-    }
-
     /// Line of a function, from 1, and its number of parameters.
     pub fn signature(&self, function: FunctionId) -> (u32, usize) {
         let function = &self.functions[function.0];
