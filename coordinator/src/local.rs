@@ -12,15 +12,13 @@ use crate::{
     control::{Existing, Placement, place},
     ids::ExperimentId,
     limits::UNFINISHED_MAX,
-    runs::{describe, describe_elites, describe_judgement},
+    runs::news,
     store::{
         Entry, ExperimentRecord, ExperimentState, GenerationCommit, GenerationRecord, Store,
         StoreError,
     },
     submission::Submission,
 };
-
-pub use crate::runs::completion;
 
 /// Number of generations to read at once.
 const PAGE_LEN: u32 = 100;
@@ -135,18 +133,12 @@ impl LocalRun {
             statistics: Statistics::from_fitness(&means),
             digest: evolution.digest().to_string(),
             duration_ms: duration.as_millis() as u64,
-            episodes: told.trial_fitness.iter().map(|trials| trials.len() as u64).sum(),
+            episodes: told.n_episodes(),
             workers: n_workers,
             idle_share: 0.0,
         };
         let mut notices = notices.to_vec();
-        if !told.blocks.is_empty() || !told.end.blocks.is_empty() {
-            notices.extend(outcome.champion.as_ref().map(describe));
-        }
-        if !told.end.judgement.is_empty() {
-            notices.extend(outcome.champion.as_ref().map(describe_judgement));
-            notices.extend(describe_elites(evolution, &told.end));
-        }
+        notices.extend(news(evolution, told, outcome.champion.as_ref()));
         let bytes = told.to_bytes();
         let keyframe = evolution.is_keyframe_due(bytes.len()).then(|| evolution.keyframe());
         let commit = GenerationCommit {

@@ -1,9 +1,8 @@
 //! The algorithms, as ask and tell.
 
-use coordinator::local::completion;
 use evolution::{
     ALGORITHMS, Champion, ChampionSource, Direction, End, Evaluations, EvolutionError, Generation,
-    Learnt, Setup, SetupError,
+    Learnt, Setup, SetupError, completion,
 };
 use experiment_file::{
     AlgorithmDescription, DefaultValue, Domain, ExperimentConfig, Parameter, ParameterValue, Params,

@@ -42,7 +42,7 @@ use std::{
     sync::Arc,
 };
 
-use engine::{Batch, EvaluatedBatch};
+use engine::EvaluatedBatch;
 
 use crate::{
     ids::{EvaluationId, ExperimentId},
@@ -53,9 +53,7 @@ use crate::{
 pub use change_queue::{Change, PendingChange, Request, RequestId};
 pub use evaluations::Evaluation;
 pub use messages::{Command, CommitOutcome, RunId};
-pub use round::{
-    Next, ReadyToCommit, Round, completion, describe, describe_elites, describe_judgement,
-};
+pub use round::{Next, ReadyToCommit, Round, news};
 pub use runnable::Runnable;
 pub use stats::RunStats;
 
@@ -342,10 +340,7 @@ impl Runs {
     /// Has the fleet evaluate a batch for a run.
     fn evaluate(&mut self, id: ExperimentId, round: Round) {
         let Some(run) = self.runs.get_mut(&id) else { return };
-        let n_trials = round.n_trials(&run.config);
-        let (set, genotypes) = (round.trial_set(), round.genotypes());
-        let batch = Batch::described(set, genotypes, n_trials, round.n_descriptors());
-        let batch = Batch { distribution: round.distribution(), ..batch };
+        let batch = round.batch(&run.config);
         self.commands.push_back(Command::Evaluate { job: id.into(), batch });
         run.stage = Stage::Evaluating(round);
     }

@@ -1,32 +1,32 @@
-//! Rounds, and their conclusions. A round is a generation, a re-evaluation of candidates for the
-//! champion on held-out trials, or at the end the judgement of the champion and of all elites on
-//! trials that select nothing.
+//! A round of evolution on the fleet, and what people read about it.
 
 use std::sync::Arc;
 
 use experiment_file::ExperimentConfig;
-use sim_core::TrialSet;
 use swarm_telemetry::number;
 
-use engine::EvaluatedBatch;
-
-use crate::store::GenerationRecord;
+use engine::{Batch, EvaluatedBatch};
 use evolution::{
-    Champion, ChampionSource, End, Evolution, EvolutionError, Front, GenerationSummary, Judgement,
-    Learnt, NextLink, Population, Reevaluation, Told,
+    Champion, ChampionSource, Concluded, End, Evolution, EvolutionError, Front, NextLink, Told,
 };
 
-/// A batch that the fleet evaluates, with its purpose.
+use crate::store::GenerationRecord;
+
+/// A round that the fleet evaluates, with what the fleet said of the earlier rounds of the same
+/// generation.
 #[derive(Debug)]
-pub enum Round {
-    /// The next generation.
-    Generation(Arc<Evolution>, evolution::Generation),
-    /// Candidates on a block of held-out trials, after a generation that evolution has learnt
-    /// from and that is not committed yet.
-    Reevaluation(Box<UpdatedEvolution>, Box<Reevaluation>),
-    /// The champion and the elites of a repertoire on trials that select nothing, after the last
-    /// generation, which is not committed yet.
-    Judgement(Box<ReadyToCommit>, Box<Judgement>),
+pub struct Round {
+    of: evolution::Round,
+    figures: Figures,
+    notices: Vec<String>,
+}
+
+/// The fleet's figures of a generation.
+#[derive(Debug, Clone, Copy, Default)]
+struct Figures {
+    duration_ms: u64,
+    n_workers: u64,
+    idle_share: f64,
 }
 
 /// The step after a round.
@@ -36,18 +36,6 @@ pub enum Next {
     Evaluate(Box<Round>),
     /// The generation is complete.
     Commit(Box<ReadyToCommit>),
-}
-
-/// The state of evolution after it has learnt from a generation.
-#[derive(Debug, Clone)]
-pub struct UpdatedEvolution {
-    evolution: Evolution,
-    generation: GenerationRecord,
-    /// The fitness that it learnt from.
-    told: Told,
-    notices: Vec<String>,
-    /// Why evolution is over, if it is; empty if all generations are done.
-    completed: Option<String>,
 }
 
 /// A generation that is ready to commit.
@@ -71,191 +59,100 @@ pub struct ReadyToCommit {
     pub next: Option<Round>,
 }
 
+impl From<evolution::Round> for Round {
+    fn from(of: evolution::Round) -> Self {
+        Self { of, figures: Figures::default(), notices: Vec::new() }
+    }
+}
+
 impl Round {
     /// The next generation of an evolution.
     pub fn generation(evolution: impl Into<Arc<Evolution>>) -> Self {
-        let evolution = evolution.into();
-        let generation = evolution.ask();
-        Self::Generation(evolution, generation)
+        evolution::Round::generation(evolution).into()
     }
 
-    /// The trial set of the round.
-    pub fn trial_set(&self) -> TrialSet {
-        match self {
-            Self::Generation(_, generation) => TrialSet::Generation(generation.index),
-            Self::Reevaluation(_, reevaluation) => reevaluation.trial_set(),
-            Self::Judgement(_, judgement) => judgement.trial_set(),
-        }
-    }
-
-    /// The genotypes to evaluate.
-    pub fn genotypes(&self) -> Population {
-        match self {
-            Self::Generation(_, generation) => Arc::clone(&generation.genotypes),
-            Self::Reevaluation(_, reevaluation) => reevaluation.genotypes(),
-            Self::Judgement(_, judgement) => judgement.genotypes(),
-        }
-    }
-
-    /// The distribution of the genotypes, if workers can draw from it.
-    pub fn distribution(&self) -> Option<Arc<[u8]>> {
-        match self {
-            Self::Generation(evolution, _) => evolution.distribution().map(Into::into),
-            Self::Reevaluation(..) | Self::Judgement(..) => None,
-        }
+    /// The batch to evaluate.
+    pub fn batch(&self, config: &ExperimentConfig) -> Batch {
+        let (set, n_trials) = (self.of.trial_set(), self.of.n_trials(config));
+        let batch = Batch::described(set, self.of.genotypes(), n_trials, self.of.n_descriptors());
+        Batch { distribution: self.of.distribution(), ..batch }
     }
 
     /// The generation's link of the digest chain.
     pub fn link(&self) -> Option<Arc<NextLink>> {
-        match self {
-            Self::Generation(_, generation) => Some(generation.link()),
-            Self::Reevaluation(..) | Self::Judgement(..) => None,
-        }
+        self.of.link()
     }
 
-    /// Descriptors of each trial.
-    pub fn n_descriptors(&self) -> usize {
-        match self {
-            Self::Generation(evolution, _) => evolution.n_descriptors(),
-            Self::Reevaluation(..) => 0,
-            Self::Judgement(_, judgement) => judgement.values_per_trial() - 1,
-        }
-    }
-
-    /// Trials of each genotype.
-    pub fn n_trials(&self, config: &ExperimentConfig) -> u32 {
-        match self {
-            Self::Generation(..) => config.algorithm.num_evaluations,
-            Self::Reevaluation(..) => config.algorithm.champion_trials,
-            Self::Judgement(..) => config.algorithm.judgement_trials,
-        }
-    }
-
-    /// Concludes the round with the fitness of its batch. Fails if evolution cannot continue.
+    /// Concludes the round with its batch. Fails if evolution cannot continue.
     pub fn conclude(
         self,
         config: &ExperimentConfig,
         evaluated: &EvaluatedBatch,
     ) -> Result<Next, EvolutionError> {
-        match self {
-            Self::Generation(evolution, generation) => {
-                // Usually, the previous generation is stored by now, and nothing is copied.
-                let evolution = Arc::unwrap_or_clone(evolution);
-                let updated = learn(config, evolution, generation, evaluated)?;
-                Ok(match updated.evolution.reevaluation() {
-                    Some(reevaluation)
-                        if updated.completed.is_some() || updated.is_scheduled(config) =>
-                    {
-                        let round = Self::Reevaluation(Box::new(updated), Box::new(reevaluation));
-                        Next::Evaluate(Box::new(round))
-                    }
-                    _ => Next::Commit(Box::new(updated.into_ready(None))),
-                })
-            }
-            Self::Reevaluation(mut updated, mut reevaluation) => {
-                reevaluation.learn(&evaluated.values);
-                updated.notices.extend(evaluated.notices.iter().cloned());
-                if !reevaluation.is_over() {
-                    return Ok(Next::Evaluate(Box::new(Self::Reevaluation(updated, reevaluation))));
-                }
-                let mut with_champion = updated.evolution.clone();
-                with_champion.set_champion(&reevaluation);
-                updated.notices.extend(with_champion.champion().map(describe));
-                let blocks = reevaluation.blocks().to_vec();
-                if updated.is_scheduled(config) {
-                    updated.evolution = with_champion.clone();
-                    updated.told.blocks = blocks;
-                } else {
-                    updated.told.end = End { blocks, ..End::default() };
-                }
-                let is_last = updated.completed.is_some();
-                let judgement = with_champion.judgement().filter(|_| is_last);
-                let ready = Box::new(updated.into_ready(Some(with_champion)));
-                Ok(match judgement {
-                    Some(judgement) => {
-                        Next::Evaluate(Box::new(Self::Judgement(ready, Box::new(judgement))))
-                    }
-                    None => Next::Commit(ready),
-                })
-            }
-            Self::Judgement(mut ready, judgement) => {
-                let blocks = std::mem::take(&mut ready.told.end.blocks);
-                ready.told.end = End { blocks, ..judgement.end(&evaluated.values) };
-                let (champion, digest) = judgement.decide(&evaluated.values);
-                ready.notices.extend(evaluated.notices.iter().cloned());
-                ready.notices.push(describe_judgement(&champion));
-                ready.notices.extend(describe_elites(&ready.evolution, &ready.told.end));
-                ready.digest = digest.to_string();
-                ready.champion = Some(champion);
-                Ok(Next::Commit(ready))
-            }
+        let Self { of, mut figures, mut notices } = self;
+        if matches!(of, evolution::Round::Generation(..)) {
+            figures = Figures {
+                duration_ms: evaluated.duration.as_millis() as u64,
+                n_workers: evaluated.n_workers as u64,
+                idle_share: evaluated.idle_share,
+            };
         }
+        notices.extend(evaluated.notices.iter().cloned());
+        Ok(match of.conclude(config, &evaluated.values)? {
+            evolution::Next::Evaluate(of) => {
+                Next::Evaluate(Box::new(Self { of: *of, figures, notices }))
+            }
+            evolution::Next::Commit(concluded) => {
+                Next::Commit(Box::new(ready_to_commit(*concluded, figures, notices)))
+            }
+        })
     }
 }
 
-impl UpdatedEvolution {
-    fn is_scheduled(&self, config: &ExperimentConfig) -> bool {
-        config.algorithm.compares_after(self.evolution.n_generations())
-    }
-
-    /// `with_champion`: evolution after a re-evaluation. An extended run does not continue from the
-    /// extra re-evaluation at the former end, because its later generations must have the bits of a
-    /// run that had all these generations from the beginning.
-    fn into_ready(self, with_champion: Option<Evolution>) -> ReadyToCommit {
-        let Self { evolution, generation, told, notices, completed } = self;
-        let digest = match &with_champion {
-            Some(with_champion) => with_champion.champion_digest(),
-            None => evolution.digest(),
-        };
-        let champion = with_champion.as_ref().unwrap_or(&evolution).champion().cloned();
-        let evolution = Arc::new(evolution);
-        ReadyToCommit {
-            generation,
-            told,
-            champion,
-            digest: digest.to_string(),
-            notices,
-            next: completed.is_none().then(|| Round::generation(Arc::clone(&evolution))),
-            evolution,
-            completed,
-        }
+fn ready_to_commit(
+    concluded: Concluded,
+    figures: Figures,
+    mut notices: Vec<String>,
+) -> ReadyToCommit {
+    let Concluded { evolution, told, learnt, champion, digest, next } = concluded;
+    let summary = learnt.summary;
+    notices.extend(learnt.notices);
+    notices.extend(news(&evolution, &told, champion.as_ref()));
+    ReadyToCommit {
+        generation: GenerationRecord {
+            generation: summary.generation,
+            statistics: summary.statistics,
+            digest: summary.digest.to_string(),
+            duration_ms: figures.duration_ms,
+            episodes: told.n_episodes(),
+            workers: figures.n_workers,
+            idle_share: figures.idle_share,
+        },
+        told,
+        evolution,
+        champion,
+        digest: digest.to_string(),
+        notices,
+        completed: learnt.completed,
+        next: next.map(Round::from),
     }
 }
 
-fn learn(
-    config: &ExperimentConfig,
-    mut evolution: Evolution,
-    generation: evolution::Generation,
-    evaluated: &EvaluatedBatch,
-) -> Result<UpdatedEvolution, EvolutionError> {
-    let told = Told::from_values(&evaluated.values, evolution.n_descriptors());
-    let learnt = evolution.learn(generation, &told, |summary| completion(config, summary))?;
-    let Learnt { summary, notices: remarks, completed } = learnt;
-    let generation = GenerationRecord {
-        generation: summary.generation,
-        statistics: summary.statistics,
-        digest: summary.digest.to_string(),
-        duration_ms: evaluated.duration.as_millis() as u64,
-        episodes: told.trial_fitness.iter().map(|trials| trials.len() as u64).sum(),
-        workers: evaluated.n_workers as u64,
-        idle_share: evaluated.idle_share,
-    };
-    let notices = [evaluated.notices.clone(), remarks].concat();
-    Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
-}
-
-/// Why a run is over after a generation, if it is; empty if all generations are done.
-pub fn completion(config: &ExperimentConfig, summary: &GenerationSummary) -> Option<String> {
-    let algorithm = &config.algorithm;
-    let (n_generations, mean) = (summary.generation + 1, summary.statistics.mean.get());
-    if algorithm.target_fitness.is_some_and(|target| mean >= target) {
-        return Some(format!("the mean fitness {mean} has reached the target"));
+/// What a generation has to say about the champion and, at the end of a run, the elites; for the log.
+pub fn news(evolution: &Evolution, told: &Told, champion: Option<&Champion>) -> Vec<String> {
+    let mut news = Vec::new();
+    if !told.blocks.is_empty() || !told.end.blocks.is_empty() {
+        news.extend(champion.map(describe));
     }
-    (n_generations >= algorithm.generations).then(String::new)
+    if !told.end.judgement.is_empty() {
+        news.extend(champion.map(describe_judgement));
+        news.extend(describe_elites(evolution, &told.end));
+    }
+    news
 }
 
-/// Describes a champion after a re-evaluation, for the log.
-pub fn describe(champion: &Champion) -> String {
+/// Describes a champion after a re-evaluation.
+fn describe(champion: &Champion) -> String {
     let held_out = match &champion.held_out {
         Some(held_out) => format!(
             "selected with mean {} on {} held-out trials, optimistic",
@@ -275,8 +172,8 @@ pub fn describe(champion: &Champion) -> String {
     }
 }
 
-/// Describes a champion's judgement, for the log.
-pub fn describe_judgement(champion: &Champion) -> String {
+/// Describes a champion's judgement.
+fn describe_judgement(champion: &Champion) -> String {
     match &champion.judged {
         Some(judged) => format!(
             "champion judged: {} (95 %: {} to {}) on {} trials that selected nothing",
@@ -289,9 +186,9 @@ pub fn describe_judgement(champion: &Champion) -> String {
     }
 }
 
-/// Describes the repertoire or the front at the end of a run by its corrected figures, for the log;
-/// `None` without one.
-pub fn describe_elites(evolution: &Evolution, end: &End) -> Option<String> {
+/// Describes the repertoire or the front at the end of a run by its corrected figures; `None` without
+/// one.
+fn describe_elites(evolution: &Evolution, end: &End) -> Option<String> {
     evolution
         .front(end)
         .map_or_else(|| describe_repertoire(evolution, end), |front| Some(describe_front(&front)))

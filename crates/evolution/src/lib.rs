@@ -41,6 +41,7 @@
 //!   evaluate again on held-out trials, and [`Evolution::set_champion`] keeps the best of them. At
 //!   the end of a run, [`Evolution::judgement`] measures the champion's honest fitness, on trials
 //!   that selected nothing.
+//! - [`Round`] is the next batch of a run of an experiment file, in this order.
 //!
 //! An algorithm only samples and updates. All algorithms share statistics, champion, digest and the
 //! rule for fitness that is not finite.
@@ -63,6 +64,7 @@ mod real;
 mod reevaluation;
 mod repertoire;
 mod repetition;
+mod round;
 mod setup;
 mod stall;
 mod statistics;
@@ -91,6 +93,7 @@ pub use real::{NotANumber, Real};
 pub use reevaluation::Reevaluation;
 pub use repertoire::{Corrected, EliteReport, JudgedElite, Repertoire};
 pub use repetition::{Evaluated, Outcome, Repeated};
+pub use round::{Concluded, Next, Round, completion};
 pub use setup::{Setup, SetupError};
 pub use stall::{Drifted, FLAT_COUNTED_MAX, Learnt};
 pub use statistics::{Statistics, between, deviation, finite_mean};

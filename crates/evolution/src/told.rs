@@ -125,6 +125,11 @@ impl Told {
             && self.trial_fitness.iter().zip(&self.descriptors).all(fits)
     }
 
+    /// Number of trials that evolution has learnt from.
+    pub fn n_episodes(&self) -> u64 {
+        self.trial_fitness.iter().map(|trials| trials.len() as u64).sum()
+    }
+
     /// The entry as bytes, for storage.
     pub fn to_bytes(&self) -> Vec<u8> {
         let Self { trial_fitness, descriptors, blocks, end } = self;

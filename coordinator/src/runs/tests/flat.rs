@@ -10,10 +10,10 @@ fn run(name: &str, generations: u64, fitness: fn(usize) -> f64) -> (Vec<String>,
     let mut round = Round::generation(world::evolution(&config));
     let mut notices = Vec::new();
     loop {
-        let genotypes = round.genotypes();
-        let n_trials = round.n_trials(&config) as usize;
-        let values =
-            (0..genotypes.len()).map(|i| (0..n_trials).map(|trial| fitness(i + trial)).collect());
+        let batch = round.batch(&config);
+        let n_trials = batch.n_trials as usize;
+        let values = (0..batch.genotypes.len())
+            .map(|i| (0..n_trials).map(|trial| fitness(i + trial)).collect());
         let evaluated = EvaluatedBatch { values: values.collect(), ..world::evaluated(&[], 0) };
         match round.conclude(&config, &evaluated) {
             Err(error) => return (notices, Some(error.to_string())),

@@ -5,6 +5,7 @@ mod histories;
 mod world;
 
 use super::*;
+use engine::Batch;
 use world::World;
 
 /// A world with one run that commits generation 0 and evaluates generation 1.

@@ -3,6 +3,7 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
+use engine::Batch;
 use evolution::{Evolution, Population};
 use experiment_file::ExperimentConfig;
 use sim_core::TrialSet;
@@ -112,7 +113,8 @@ pub fn undisturbed(config: &ExperimentConfig, n_generations: u64) -> Evolution {
     while current.n_generations() < n_generations {
         let mut round = Round::generation(current.clone());
         current = loop {
-            let fitness = evaluated(&round.genotypes(), round.n_trials(&longer));
+            let batch = round.batch(&longer);
+            let fitness = evaluated(&batch.genotypes, batch.n_trials);
             match round.conclude(&longer, &fitness).unwrap() {
                 Next::Evaluate(next) => round = *next,
                 Next::Commit(ready) => break Arc::unwrap_or_clone(ready.evolution),
