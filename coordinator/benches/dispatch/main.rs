@@ -36,7 +36,7 @@ async fn main() {
         }
         let (evaluating, overall): (Vec<f64>, Vec<f64>) = runs.into_iter().unzip();
         line("items/s while a generation is evaluated", 20_000.0, 100_000.0, evaluating);
-        line("items/s with evolution and commits", f64::NAN, f64::NAN, overall);
+        line("items/s with evolution and commits", 80_000.0, 120_000.0, overall);
     }
     for (name, file) in [("SNES", SNES), ("GA", GA)] {
         let name = format!("generation of 100 by {name}, ms");
@@ -46,7 +46,7 @@ async fn main() {
                 runs.push(generation_ms(file).await);
             }
             let part = |part: fn(&GenerationParts) -> f64| runs.iter().map(part).collect();
-            line(&name, 5.0, 1.5, part(|parts| parts.all));
+            line(&name, 2.0, 1.0, part(|parts| parts.all));
             detail("tell and ask, alone", part(|parts| parts.alone.evolution));
             detail("dispatch and results: the rest", part(GenerationParts::dispatch));
             detail("beside it: checkpoint and commit, alone", part(|parts| parts.alone.commit));

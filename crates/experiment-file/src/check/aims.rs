@@ -1,7 +1,8 @@
 //! Checks the aims: the algorithm learns from them, and its front is within its limit.
 
+use super::descriptors::distinct;
 use crate::report::{Path, Report};
-use crate::{AimConfig, AlgorithmDescription, ExperimentConfig, LearnsFrom, limits};
+use crate::{AlgorithmDescription, ExperimentConfig, LearnsFrom, limits};
 
 /// An example for messages.
 const EXAMPLE: &str = r#""aims": {"measure": "turning", "direction": "minimise"}"#;
@@ -16,15 +17,8 @@ pub(super) fn check(
     if let Some(algorithm) = algorithm {
         fit(config, algorithm, &path, report);
     }
-    for (i, aim) in aims.iter().enumerate() {
-        let path = path.index(i);
-        let same =
-            |other: &AimConfig| other.measure == aim.measure && other.summarises == aim.summarises;
-        if aims[..i].iter().any(same) {
-            let message = || format!("`{}` is an aim already", aim.measure);
-            report.conflict(&path.key("measure"), &[&path.key("of")], message);
-        }
-    }
+    let measures: Vec<_> = aims.iter().map(|aim| (&aim.measure, aim.summarises)).collect();
+    distinct(&measures, &path, "an aim", report);
 }
 
 /// Algorithm and aims belong together.

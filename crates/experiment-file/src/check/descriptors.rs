@@ -1,7 +1,9 @@
 //! Checks the descriptors: the algorithm learns from them, and they span a grid.
 
 use crate::report::{Path, Report};
-use crate::{AlgorithmDescription, DescriptorConfig, ExperimentConfig, Keeps, LearnsFrom, limits};
+use crate::{
+    AlgorithmDescription, DescriptorConfig, ExperimentConfig, Keeps, LearnsFrom, Summarises, limits,
+};
 
 /// An example for messages.
 const EXAMPLE: &str =
@@ -25,19 +27,30 @@ pub(super) fn check(
             let message = || format!("ends at {high}, not above its beginning {low}");
             report.conflict(&path.key("range"), &[], message);
         }
-        let same = |other: &&DescriptorConfig| {
-            other.measure == descriptor.measure && other.summarises == descriptor.summarises
-        };
-        if descriptors[..i].iter().any(|other| same(&other)) {
-            let message = || format!("`{}` is a descriptor already", descriptor.measure);
-            report.conflict(&path.key("measure"), &[&path.key("of")], message);
-        }
     }
+    let measures: Vec<_> = descriptors.iter().map(|of| (&of.measure, of.summarises)).collect();
+    distinct(&measures, &path, "a descriptor", report);
     let n_cells = DescriptorConfig::n_cells(descriptors);
     if n_cells > limits::ELITES.into() {
         let limit = limits::ELITES;
         let message = || format!("the grid has {n_cells} cells, the limit is {limit}");
         report.conflict(&path, &[], message);
+    }
+}
+
+/// Refuses a measure that is in a list at `path` twice.
+pub(super) fn distinct(
+    measures: &[(&String, Summarises)],
+    path: &Path,
+    what: &str,
+    report: &Report<'_>,
+) {
+    for (i, measure) in measures.iter().enumerate() {
+        if measures[..i].contains(measure) {
+            let path = path.index(i);
+            let message = || format!("`{}` is {what} already", measure.0);
+            report.conflict(&path.key("measure"), &[&path.key("of")], message);
+        }
     }
 }
 
