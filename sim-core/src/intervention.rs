@@ -125,7 +125,7 @@ pub(crate) fn in_order(
         let n = interventions.len();
         vec![format!("an episode has at most {INTERVENTIONS_MAX} interventions, not {n}")]
     } else {
-        interventions.iter().filter_map(|it| it.problem(world, n_steps)).collect()
+        interventions.iter().filter_map(|asked| asked.problem(world, n_steps)).collect()
     };
     // Those of one step keep their order.
     interventions.sort_by_key(|intervention| intervention.step);

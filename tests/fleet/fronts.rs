@@ -52,7 +52,7 @@ fn elites_of_a_front_are_judged_and_have_addresses() {
     let on_it: Vec<&Value> = elites.iter().filter(|elite| elite["shown"] == true).collect();
     assert_eq!(front["figures"]["stay"], json!(on_it.len() as f64 / elites.len() as f64));
     let better = |a: &Value, b: &Value| {
-        let of = |it: &Value, key: &str| it["judged"].pointer(key).unwrap().as_f64().unwrap();
+        let of = |elite: &Value, key: &str| elite["judged"].pointer(key).unwrap().as_f64().unwrap();
         let (leaders, fitness) = ("/aims/leaders_mean", "/fitness");
         of(a, leaders) <= of(b, leaders) && of(a, fitness) > of(b, fitness)
     };

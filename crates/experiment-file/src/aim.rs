@@ -57,15 +57,16 @@ impl AlgorithmConfig {
     /// aims. An experiment has only one of both.
     pub fn learnt_measures(&self) -> impl Iterator<Item = LearntMeasure<'_>> {
         let of = |key: &str, i: usize| format!("algorithm.{key}[{i}].measure");
-        let descriptors = self.descriptors.iter().enumerate().map(move |(i, it)| LearntMeasure {
-            path: of("descriptors", i),
-            measure: &it.measure,
-            summarises: it.summarises,
-        });
-        let aims = self.aims.iter().enumerate().map(move |(i, it)| LearntMeasure {
+        let descriptors =
+            self.descriptors.iter().enumerate().map(move |(i, descriptor)| LearntMeasure {
+                path: of("descriptors", i),
+                measure: &descriptor.measure,
+                summarises: descriptor.summarises,
+            });
+        let aims = self.aims.iter().enumerate().map(move |(i, aim)| LearntMeasure {
             path: of("aims", i),
-            measure: &it.measure,
-            summarises: it.summarises,
+            measure: &aim.measure,
+            summarises: aim.summarises,
         });
         descriptors.chain(aims)
     }

@@ -38,7 +38,7 @@ fn a_group_lists_its_keys_and_those_that_must_be_there() {
     assert!(file.below["world"].starts_with("The arena"), "{:?}", file.below);
     assert!(!file.below.contains_key("render"), "keys without effect are left out");
     let objects = explain("world.objects.NAME").unwrap();
-    let types: Vec<&Value> = objects.facts.values.iter().map(|it| &it.value).collect();
+    let types: Vec<&Value> = objects.facts.values.iter().map(|named| &named.value).collect();
     assert!(types.contains(&&Value::from("robot")), "{types:?}");
 }
 

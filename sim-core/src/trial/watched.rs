@@ -137,7 +137,8 @@ impl Trial<'_> {
                 self.swarm.moved = true;
             }
             Thing::Movable(movable) => {
-                let first = self.interior.as_ref().map_or(0, |it| it.bodies.loads().start);
+                let first =
+                    self.interior.as_ref().map_or(0, |interior| interior.bodies.loads().start);
                 self.put_body(first + movable, thing, place, step)?;
                 self.swarm.moved = true;
             }

@@ -153,16 +153,16 @@ impl Ranking {
         ]);
         let mut champions: Vec<&Champion> = self.champions.iter().collect();
         champions.sort_by_key(|champion| champion.rank);
-        for it in champions {
-            let ends = it.drop.ci95.map(|ends| ends.map(|end| text::number(end, 3)));
+        for champion in champions {
+            let ends = champion.drop.ci95.map(|ends| ends.map(|end| text::number(end, 3)));
             table.push([
-                it.evaluation.clone(),
-                text::number(it.nominal, 3),
-                it.nominal_rank.to_string(),
-                text::number(it.mean, 3),
-                it.rank.to_string(),
-                text::number(it.worst_tenth, 3),
-                text::number(it.drop.value, 3),
+                champion.evaluation.clone(),
+                text::number(champion.nominal, 3),
+                champion.nominal_rank.to_string(),
+                text::number(champion.mean, 3),
+                champion.rank.to_string(),
+                text::number(champion.worst_tenth, 3),
+                text::number(champion.drop.value, 3),
                 ends.map_or_else(|| "-".into(), |[low, high]| format!("{low} to {high}")),
             ]);
         }

@@ -113,7 +113,9 @@ impl Realities {
     /// then each range alone.
     pub fn conditions(&self) -> impl Iterator<Item = (String, Role, Json)> {
         let object = |numbers: &IndexMap<&'static str, Json>| {
-            Json::Object(numbers.iter().map(|(key, it)| ((*key).to_owned(), it.clone())).collect())
+            Json::Object(
+                numbers.iter().map(|(key, number)| ((*key).to_owned(), number.clone())).collect(),
+            )
         };
         let realities = self.drawn.iter().enumerate().map(move |(number, numbers)| {
             (format!("reality {number}"), Role::Reality, object(numbers))
@@ -128,8 +130,8 @@ impl Realities {
 
 /// The values of parameters as JSON.
 fn values(params: &Params) -> IndexMap<String, Json> {
-    let value = |value| Json::parse(&json::line(value));
-    params.iter().map(|(key, it)| (key.to_owned(), value(it))).collect()
+    let parsed = |value| Json::parse(&json::line(value));
+    params.iter().map(|(key, value)| (key.to_owned(), parsed(value))).collect()
 }
 
 /// Whether robots have what a key needs.

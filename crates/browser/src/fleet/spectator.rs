@@ -122,7 +122,8 @@ impl Spectator {
     }
 
     fn event(&mut self, at: f64, note: Note, machines: &mut [Machine]) -> Option<Event> {
-        let index = |id: WorkerId| machines.iter().position(|it| it.connection == Some(id));
+        let index =
+            |id: WorkerId| machines.iter().position(|machine| machine.connection == Some(id));
         Some(match note {
             Note::Sent { worker, assignment, individual, trials, arrives } => {
                 let worker = index(worker)?;

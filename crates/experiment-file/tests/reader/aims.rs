@@ -30,7 +30,7 @@ fn an_aim_needs_no_list_and_files_without_aims_do_not_mention_them() {
     let two = format!(r#""aims": [{TURNING}, {{"measure": "x", "direction": "maximise"}}],"#);
     let of_two = accept(&with("NSGA-II", &two));
     assert_eq!(of_two.algorithm.aims[0].direction, Direction::Minimise);
-    let paths: Vec<String> = of_two.algorithm.learnt_measures().map(|it| it.path).collect();
+    let paths: Vec<String> = of_two.algorithm.learnt_measures().map(|learnt| learnt.path).collect();
     assert_eq!(paths, ["algorithm.aims[0].measure", "algorithm.aims[1].measure"]);
     for config in [of_one, of_two] {
         let canonical = config.to_canonical_json();

@@ -89,7 +89,7 @@ fn a_mute_robot_hears_and_a_deaf_one_is_heard() {
     let hears = |steps: &[StepRecord]| {
         steps.iter().any(|step| {
             let robot = &step.robots[number];
-            robot.received.is_some() || robot.received_message.iter().any(|it| *it != 0.0)
+            robot.received.is_some() || robot.received_message.iter().any(|value| *value != 0.0)
         })
     };
     assert!(hears(after(&undisturbed)));
@@ -282,7 +282,8 @@ fn sight(interventions: &[Intervention]) -> [bool; 3] {
     // Stimuli are in the alphabetical order of their names in this JSON. Walls are farther than
     // half of the rays' range.
     let stimuli = &steps[STEP as usize].robots[0].stimuli;
-    let sees = |inputs: Range<usize>, more_than| stimuli[inputs].iter().any(|it| *it > more_than);
+    let sees =
+        |inputs: Range<usize>, more_than| stimuli[inputs].iter().any(|value| *value > more_than);
     [sees(5..9, 0.5), sees(1..5, 0.0), sees(0..1, 0.0)]
 }
 

@@ -57,13 +57,13 @@ impl<'a> Fixed<'a> {
         let mut discs = Self { areas: Vec::new(), lights: Vec::new(), room };
         for object in config.world.objects.values() {
             let (all, disc, n) = match object {
-                ObjectConfig::GroundArea(it) => {
-                    let disc = (it.params.range, color_named(&it.params.color));
-                    (&mut discs.areas, disc, it.num_instances)
+                ObjectConfig::GroundArea(area) => {
+                    let disc = (area.params.range, color_named(&area.params.color));
+                    (&mut discs.areas, disc, area.num_instances)
                 }
-                ObjectConfig::LightSource(it) => {
-                    let disc = (it.params.range, color_named(&it.params.color));
-                    (&mut discs.lights, disc, it.num_instances)
+                ObjectConfig::LightSource(light) => {
+                    let disc = (light.params.range, color_named(&light.params.color));
+                    (&mut discs.lights, disc, light.num_instances)
                 }
                 _ => continue,
             };
