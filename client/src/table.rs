@@ -218,15 +218,22 @@ impl Table {
 /// and of those that are not finite, are empty. Text that a spreadsheet would read as a formula
 /// gets an apostrophe.
 pub fn csv(keys: &[&str], records: &[impl Serialize]) -> String {
-    let headings: Vec<String> = keys.iter().map(|key| key.replace('.', "_")).collect();
+    let paths: Vec<Vec<&str>> = keys.iter().map(|key| key.split('.').collect()).collect();
+    csv_at(&paths, records)
+}
+
+/// The same by paths, for keys that people choose.
+pub fn csv_at(paths: &[Vec<&str>], records: &[impl Serialize]) -> String {
+    let text = |text: String| quoted(&without_formula(text));
+    let headings: Vec<String> = paths.iter().map(|path| text(path.join("_"))).collect();
     let mut lines = vec![headings.join(",")];
     for record in records {
         let record = serde_json::to_value(record).expect("plain data serialises");
-        let fields: Vec<String> = keys
+        let fields: Vec<String> = paths
             .iter()
-            .map(|key| match key.split('.').fold(&record, |value, key| &value[key]) {
+            .map(|path| match path.iter().fold(&record, |value, key| &value[key]) {
                 Value::Number(number) => number.to_string(),
-                value => quoted(&without_formula(cell(value))),
+                value => text(cell(value)),
             })
             .collect();
         lines.push(fields.join(","));
@@ -343,6 +350,14 @@ mod tests {
             "labels,changes,latest_best,latest_mean,none_best\n\
              \"for=a, b; user=ada\",'-x=1; y=2,-9e+98,,"
         );
+    }
+
+    #[test]
+    fn keys_that_people_choose_are_text() {
+        let record = json!({"aims": {"x.y": 1, "a,b": 2, "=c": 3}});
+        let paths = ["x.y", "a,b", "=c"].map(|key| vec!["aims", key]);
+        assert_eq!(csv_at(&paths, &[&record]), "aims_x.y,\"aims_a,b\",aims_=c\n1,2,3");
+        assert_eq!(csv_at(&[vec!["=c"]], &[json!({"=c": 3})]), "'=c\n3");
     }
 
     #[test]

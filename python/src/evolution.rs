@@ -205,8 +205,15 @@ impl Evolution {
         let genotypes: Vec<Vec<f64>> = elites.iter().map(|(genes, ..)| genes.clone()).collect();
         let values: Vec<Vec<f64>> = elites.iter().map(|(_, values, _)| values.clone()).collect();
         let born = elites.iter().map(|(.., born)| *born).collect();
-        let array = |rows: &[Vec<f64>]| PyArray2::from_vec2(py, rows);
-        Ok(Some((array(&genotypes)?, array(&values)?, born)))
+        // Without elites, arrays still have their columns.
+        let (d, n_aims) = self.0.with(py, |state| {
+            (state.evolution.n_genes(), state.evolution.n_descriptors())
+        })?;
+        let array = |rows: &[Vec<f64>], n_columns| match rows {
+            [] => Ok(PyArray2::zeros(py, [0, n_columns], false)),
+            rows => PyArray2::from_vec2(py, rows),
+        };
+        Ok(Some((array(&genotypes, d)?, array(&values, 1 + n_aims)?, born)))
     }
 
     /// A copy in the same state.

@@ -37,6 +37,15 @@ def test_a_front_has_all_compromises_of_a_function():
     assert generation < 100 and individual < 40
 
 
+def test_a_front_of_nobody_has_columns():
+    evolution = started()
+    for _ in range(2):
+        front = evolution.front()
+        assert (front.genotypes.shape, front.fitness.shape, front.aims.shape) == ((0, 4), (0,), (0, 1))
+        assert len(front.born) == 0
+        evolution.tell(evolution.ask()[:, 0], measures=np.full((40, 1), np.nan))
+
+
 def test_states_continue_to_the_same_bits():
     evolution = started(reevaluated=0.25)
     for _ in range(3):

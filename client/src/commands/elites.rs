@@ -30,7 +30,10 @@ pub async fn experiment_at(
     Ok((experiment, generation))
 }
 
-/// The address of an elite.
+/// The address of an elite. A fork's parent has the elites that were born before the fork.
 pub fn address(experiment: &Experiment, elite: &Elite) -> String {
-    format!("{}@{}/{}", experiment.id, elite.generation, elite.individual)
+    let fork = experiment.forked_from.as_ref();
+    let fork = fork.filter(|fork| elite.generation <= fork.generation);
+    let id = fork.map_or(experiment.id, |fork| fork.experiment_id);
+    format!("{id}@{}/{}", elite.generation, elite.individual)
 }

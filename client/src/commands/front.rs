@@ -21,7 +21,7 @@ use crate::{
     output_format::OutputFormat,
     progress::{Part, Progress},
     remote::Remote,
-    table::{Column, Table, csv},
+    table::{Column, Table, csv_at},
     text,
 };
 
@@ -159,9 +159,8 @@ impl Remote for FrontArgs {
         match progress.format {
             OutputFormat::Json => progress.print_document(&document(&experiment, &found)),
             OutputFormat::Csv => {
-                let keys = csv_keys(&found.aims);
-                let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
-                progress.print(&csv(&keys, &document(&experiment, &found).elites))
+                let names: Vec<String> = found.aims.iter().map(name).collect();
+                progress.print(&csv_at(&paths(&names), &document(&experiment, &found).elites))
             }
             OutputFormat::Table | OutputFormat::Wide => {
                 let table = table(&experiment, &found);
@@ -239,12 +238,12 @@ fn document(experiment: &Experiment, found: &GetFrontResponse) -> Document {
     }
 }
 
-fn csv_keys(aims: &[Aim]) -> Vec<String> {
-    let point = |prefix: &str| -> Vec<String> {
-        aims.iter().map(|aim| format!("{prefix}aims.{}", name(aim))).collect()
-    };
-    let own = ["address", "shown", "trials", "fitness"].map(str::to_owned);
-    [&own[..], &point(""), &["judged.fitness".to_owned()], &point("judged.")].concat()
+/// The columns of CSV. `names`: of the aims.
+fn paths(names: &[String]) -> Vec<Vec<&str>> {
+    let own = ["address", "shown", "trials", "fitness"].map(|key| vec![key]);
+    let aims = names.iter().map(|name| vec!["aims", name]);
+    let judged = names.iter().map(|name| vec!["judged", "aims", name]);
+    own.into_iter().chain(aims).chain([vec!["judged", "fitness"]]).chain(judged).collect()
 }
 
 /// The fitness and the aims of an elite that count now; `None` if its judgement has none.
@@ -256,12 +255,19 @@ fn counted<'a>(found: &GetFrontResponse, elite: &'a Elite) -> Option<(f64, &'a [
     }
 }
 
+/// The measures of aims; with `mean` or `end` if another aim has the same measure.
+fn headings(aims: &[Aim]) -> Vec<String> {
+    let is_twice = |aim: &Aim| aims.iter().filter(|other| other.measure == aim.measure).count() > 1;
+    aims.iter().map(|aim| if is_twice(aim) { name(aim) } else { aim.measure.clone() }).collect()
+}
+
 /// The front, best fitness first.
 fn table(experiment: &Experiment, found: &GetFrontResponse) -> Table {
     let fitness = if is_judged(found) { "judged" } else { "fitness" };
+    let headings = headings(&found.aims);
     let columns = [Column::number(fitness)]
         .into_iter()
-        .chain(found.aims.iter().map(|aim| Column::number(&aim.measure)))
+        .chain(headings.iter().map(|heading| Column::number(heading)))
         .chain([Column::number("trials").wide(), Column::new("elite")]);
     let mut table = Table::new(columns.collect::<Vec<_>>());
     let shown = found.shown.iter().filter_map(|&index| found.elites.get(index as usize));

@@ -21,7 +21,7 @@ use crate::{
     output_format::OutputFormat,
     progress::{Part, Progress},
     remote::Remote,
-    table::{Column, Table, csv},
+    table::{Column, Table, csv_at},
     text,
 };
 
@@ -160,9 +160,8 @@ impl Remote for RepertoireArgs {
         match progress.format {
             OutputFormat::Json => progress.print_document(&document(&experiment, &found)),
             OutputFormat::Csv => {
-                let keys = csv_keys(&found.axes);
-                let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
-                progress.print(&csv(&keys, &document(&experiment, &found).elites))
+                let names: Vec<String> = found.axes.iter().map(name).collect();
+                progress.print(&csv_at(&paths(&names), &document(&experiment, &found).elites))
             }
             OutputFormat::Table | OutputFormat::Wide => {
                 let table = table(&experiment, &found);
@@ -184,6 +183,9 @@ fn summary(found: &GetRepertoireResponse) -> String {
             text::percent(of.coverage),
             text::percent(of.stay)
         ),
+        None if n == 0 => {
+            format!("after generation {}: no individual has finite values", found.generation)
+        }
         None => format!(
             "after generation {}: {n} elites, not judged yet, so their fitness is optimistic",
             found.generation
@@ -232,13 +234,13 @@ fn document(experiment: &Experiment, found: &GetRepertoireResponse) -> Document 
     }
 }
 
-fn csv_keys(axes: &[DescriptorAxis]) -> Vec<String> {
-    let point = |prefix: &str| -> Vec<String> {
-        axes.iter().map(|axis| format!("{prefix}descriptors.{}", name(axis))).collect()
-    };
-    let own = ["address", "shown", "trials", "fitness", "cell"].map(str::to_owned);
-    let judged = ["judged.fitness", "judged.cell"].map(str::to_owned);
-    [&own[..], &point(""), &judged, &point("judged.")].concat()
+/// The columns of CSV. `names`: of the axes.
+fn paths(names: &[String]) -> Vec<Vec<&str>> {
+    let own = ["address", "shown", "trials", "fitness", "cell"].map(|key| vec![key]);
+    let descriptors = names.iter().map(|name| vec!["descriptors", name]);
+    let judged = ["fitness", "cell"].map(|key| vec!["judged", key]);
+    let of_judged = names.iter().map(|name| vec!["judged", "descriptors", name]);
+    own.into_iter().chain(descriptors).chain(judged).chain(of_judged).collect()
 }
 
 /// The shown elites, each with the cell, the fitness and the descriptors that count now.

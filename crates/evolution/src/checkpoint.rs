@@ -55,6 +55,9 @@ pub enum CheckpointError {
     /// The bytes are cut off, or encode no valid values.
     #[error("it cannot be read: {0}")]
     Malformed(#[from] postcard::Error),
+    /// The values of a state contradict each other or exceed the limits.
+    #[error("it is not the state of a run: its parts contradict each other, or exceed the limits")]
+    Unsound,
     /// A log entry does not fit the state, for example because it belongs to another experiment.
     #[error("the fitness of generation {generation} does not fit the state of evolution")]
     Misfit {
@@ -100,6 +103,9 @@ impl Evolution {
     /// different experiments.
     pub fn restore(checkpoint: &Checkpoint) -> Result<Self, CheckpointError> {
         let evolution: Self = decode(VERSION, &checkpoint.keyframe)?;
+        if !evolution.populations.iter().all(Algorithm::is_sound) {
+            return Err(CheckpointError::Unsound);
+        }
         let mut evolution = evolution.after_flat(checkpoint.n_flat);
         for entry in &checkpoint.log {
             evolution.repeat(&Told::from_bytes(entry)?)?;
@@ -116,7 +122,10 @@ fn generation_ns(algorithm: &Algorithm, population_size: u64) -> u64 {
     let of_matrices = |n: u64| if n == 0 { 0 } else { d * d * (n * d + population_size) / 2 };
     match algorithm.keeps() {
         // Surviving takes about as long as drawing.
-        Keeps::Repertoire => 2 * drawn + of_matrices(n_matrices(algorithm)),
+        Keeps::Repertoire => {
+            let search_ns = algorithm.behaviours().map_or(0, |of| of.search_ns(population_size));
+            (2 * drawn + of_matrices(n_matrices(algorithm))).saturating_add(search_ns)
+        }
         Keeps::Vectors | Keeps::Population => drawn,
         Keeps::Matrix => drawn + of_matrices(1),
     }

@@ -21,6 +21,13 @@ pub struct Fork<'a> {
     pub simulation: &'a str,
 }
 
+impl Fork<'_> {
+    /// Whether parent and child mean the same by fitness.
+    fn means_the_same(&self) -> bool {
+        self.parent_simulation == self.simulation && task(self.parent) == task(self.child)
+    }
+}
+
 /// All changes that a fork does not allow, one line each, by their place in the experiment file;
 /// never empty. The caller has to undo them.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -38,7 +45,8 @@ impl Evolution {
     /// # Errors
     ///
     /// If the child's configuration changes the algorithm, the populations, their parameters or
-    /// numbers of genes, or asks for no more generations than the parent has.
+    /// numbers of genes, or asks for no more generations than the parent has; or if it changes the
+    /// meaning of fitness, and the state has elites with evidence.
     pub fn fork(self, fork: &Fork<'_>) -> Result<Self, ForkError> {
         let problems = self.problems(fork);
         if !problems.is_empty() {
@@ -47,7 +55,7 @@ impl Evolution {
         let Fork { parent, parent_simulation, child, simulation, .. } = fork;
         let its_own = Digest::of_config(child, simulation);
         let is_changed = Digest::of_config(parent, parent_simulation) != its_own;
-        let means_the_same = parent_simulation == simulation && task(parent) == task(child);
+        let means_the_same = fork.means_the_same();
         Ok(Self {
             seed: child.seed,
             population_size: child.algorithm.population_size as usize,
@@ -80,6 +88,13 @@ impl Evolution {
         for (key, _) in are_changed.into_iter().filter(|(_, is_changed)| *is_changed) {
             problems.push(format!(
                 "algorithm.{key}: are part of the state of {}, and cannot change in a fork",
+                parent.name
+            ));
+        }
+        if self.behaviours().is_some() && !fork.means_the_same() {
+            problems.push(format!(
+                "algorithm.name: the elites of {} keep the evidence of the parent's task, so a fork \
+                 cannot change the task; submit it as an experiment of its own",
                 parent.name
             ));
         }

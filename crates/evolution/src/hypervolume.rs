@@ -20,9 +20,12 @@ pub fn hypervolume(costs: &[Vec<f64>], reference: &[f64]) -> f64 {
     for (i, &[x, y, z]) in points.iter().enumerate() {
         stairs.add([x, y]);
         let next = points.get(i + 1).map_or(end, |next| next[2]);
-        volume += stairs.area * (next - z);
+        // The area of values near the largest number is infinite, and 0 times that is no number.
+        if next > z {
+            volume += stairs.area * (next - z);
+        }
     }
-    volume
+    volume.min(f64::MAX)
 }
 
 fn point(costs: &[f64]) -> [f64; 3] {
@@ -73,6 +76,17 @@ mod tests {
         let cubes = [[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]].map(Vec::from);
         assert_eq!(hypervolume(&cubes, &[2.0; 3]), 4.0);
         assert_eq!(hypervolume(&[], &[4.0, 4.0]), 0.0);
+    }
+
+    #[test]
+    fn volumes_of_the_largest_numbers_are_numbers() {
+        let huge = f64::MAX;
+        for n_aims in [2, 3] {
+            let costs = [[-huge, 1.0, 0.5], [1.0, -huge, 0.5], [0.0, 0.0, -huge]];
+            let costs = costs.map(|costs| costs[..n_aims].to_vec());
+            let volume = hypervolume(&costs, &vec![huge; n_aims]);
+            assert!(volume > 0.0 && volume.is_finite(), "{volume}");
+        }
     }
 
     #[test]

@@ -257,6 +257,11 @@ impl Evolution {
         self.champion_digest
     }
 
+    /// Number of genes of a genotype: those of all populations.
+    pub fn n_genes(&self) -> usize {
+        self.populations.iter().map(Algorithm::n_genes).sum()
+    }
+
     /// Whether both evolutions have the same seed, the same number of individuals, and
     /// populations with the same numbers of genes.
     pub fn has_shape_of(&self, other: &Self) -> bool {

@@ -127,9 +127,25 @@ impl Evolution {
         }
         let news = self.populations.iter().filter_map(|population| population.news());
         notices.extend(news.map(|news| format!("generation {}: {news}", summary.generation)));
+        notices.extend(self.nobody_kept(&summary));
         let completed = completion(&summary);
         notices.extend(self.remarks(widest_before, &summary, completed.is_some()));
         Ok(Learnt { summary, notices, completed })
+    }
+
+    /// A notice of a repertoire or a front without elites, after generations 1, 10, 100 and so on.
+    fn nobody_kept(&self, summary: &GenerationSummary) -> Option<String> {
+        let behaviours = self.behaviours().filter(|behaviours| behaviours.n_kept() == 0)?;
+        let n_generations = summary.generation + 1;
+        let is_due = n_generations.to_string().trim_end_matches('0') == "1";
+        let what = if behaviours.aims().is_empty() { "descriptors" } else { "aims" };
+        is_due.then(|| {
+            format!(
+                "generation {}: no individual has finite values of fitness and of all {what}, so \
+                 evolution learns nothing; check the measures in `algorithm.{what}`",
+                summary.generation
+            )
+        })
     }
 
     /// The largest standard deviation of a gene in any distribution; `None` without one.

@@ -65,6 +65,12 @@ pub const DEPTH: Parameter = Parameter::whole(
 );
 
 impl AlgorithmDescription {
+    /// Whether the algorithm measures the distances between behaviours, which takes time for each
+    /// pair.
+    pub(crate) fn compares_behaviours(&self) -> bool {
+        self.learns_from == LearnsFrom::Descriptors && self.has(ELITES.key)
+    }
+
     /// The largest number of elites that the algorithm keeps with these parameters. `n_cells`:
     /// number of cells of the grid.
     pub fn elites_max(&self, params: &Params, n_cells: u64, population_size: u64) -> u64 {

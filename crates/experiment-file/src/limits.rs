@@ -59,6 +59,9 @@ pub const DESCRIPTORS: usize = 8;
 pub const AIMS: usize = 2;
 /// Elites of a repertoire or of a front, and cells of a grid of descriptors.
 pub const ELITES: u32 = 16_384;
+/// Parts of distances between behaviours, one per descriptor, of each individual and elite from
+/// each: ten seconds of the coordinator per generation.
+pub const DISTANCES: u64 = 20_000_000_000;
 /// Genes of all elites of a repertoire or of a front together: a checkpoint has 8 bytes for each.
 pub const GENES_OF_REPERTOIRE: u64 = 10_000_000;
 

@@ -169,6 +169,10 @@ impl<E: Emitter> Annealing<E> {
             let n = of_cell.len() as f64;
             let mean = of_cell.iter().map(|(_, by)| by).sum::<f64>() / n;
             let share = 1.0 - libm::pow(1.0 - self.archive_rate, n);
+            // 0 times a sum that overflows would be no number.
+            if share == 0.0 {
+                continue;
+            }
             let raised = self.thresholds[of_cell[0].0] + share * mean;
             self.thresholds[of_cell[0].0] = raised.min(f64::MAX);
         }
@@ -211,6 +215,14 @@ impl<E: Emitter + Serialize + DeserializeOwned> Behaviours for Annealing<E> {
 
     fn axes(&self) -> &[Axis] {
         self.elites.axes()
+    }
+
+    fn is_sound(&self) -> bool {
+        let n_cells: u64 = self.elites.axes().iter().map(|axis| u64::from(axis.n_cells)).product();
+        self.elites.is_sound()
+            && self.thresholds.len() as u64 == n_cells
+            && (1..=limits::EMITTERS as usize).contains(&self.emitters.len())
+            && self.emitters.iter().all(|emitter| emitter.n_genes() == self.n_genes())
     }
 
     fn elites(&self) -> Vec<&Elite> {

@@ -392,6 +392,11 @@ impl Algorithm {
         }
     }
 
+    /// Whether its state may be that of a run: see [`Behaviours::is_sound`].
+    pub fn is_sound(&self) -> bool {
+        self.behaviours().is_none_or(Behaviours::is_sound)
+    }
+
     fn strategy(&self) -> Option<&dyn Strategy> {
         match self.kind() {
             Kind::Strategy(strategy) => Some(strategy),

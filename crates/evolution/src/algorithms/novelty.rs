@@ -29,13 +29,16 @@ const ADDED: Parameter = Parameter::unit(
     "added",
     0.1,
     "Largest share of the new individuals of a generation that enter the archive, the most novel \
-     first",
+     first; at least one is allowed to",
 );
 const THRESHOLD: Parameter = Parameter::amount(
     "threshold",
     0.0,
     "Least novelty that enters the archive, in ranges of the descriptors",
 );
+
+/// Parts of distances that are computed and ranked in a nanosecond, in two passes.
+const DISTANCES_PER_NS: u64 = 1;
 
 impl Rule for Novelty {
     const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
@@ -82,6 +85,11 @@ impl Rule for Novelty {
             survivors.sort_unstable();
         }
         survivors
+    }
+
+    /// A generation measures the novelty of a pool twice, in the worst case by all distances.
+    fn search_ns(&self, n_pool: u64, n_axes: u64) -> u64 {
+        n_pool.saturating_mul(n_pool).saturating_mul(n_axes) / DISTANCES_PER_NS
     }
 
     /// The more novel of two becomes a parent.

@@ -8,6 +8,7 @@
 use determinism::random::Stream;
 use experiment_file::{
     AlgorithmDescription, DefaultValue, Direction, Domain, Keeps, LearnsFrom, Parameter, Params,
+    limits,
 };
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +26,9 @@ use crate::{
     dominance::{Standing, fronts},
     front::costs,
 };
+
+/// Time to find the standing of an individual, ns (`cargo bench -p evolution`).
+const SORTING_NS: u64 = 1_500;
 
 /// A population between two generations. Its elites are its first front.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -131,7 +135,7 @@ impl Nsga2 {
     }
 }
 
-/// Tournaments of two: pairs of a random order, so that all individuals compete equally often.
+/// Tournaments of two: pairs of a random order, so that all individuals compete about equally often.
 struct Tournaments<'a> {
     standing: &'a Standing,
     /// Those who have yet to compete.
@@ -174,6 +178,17 @@ impl Behaviours for Nsga2 {
 
     fn aims(&self) -> &[Direction] {
         &self.aims
+    }
+
+    fn is_sound(&self) -> bool {
+        (1..=limits::AIMS).contains(&self.aims.len())
+            && self.kept.len() <= limits::POPULATION as usize
+            && kept::fit(&self.kept, self.d, self.aims.len())
+    }
+
+    /// A generation sorts its parents twice, and then parents and children together.
+    fn search_ns(&self, population_size: u64) -> u64 {
+        4 * SORTING_NS * population_size
     }
 
     fn elites(&self) -> Vec<&Elite> {

@@ -1,5 +1,7 @@
 //! Forks: the data that they share with their parents, and the changes that they refuse.
 
+use experiment_file::{AimConfig, Summarises};
+
 use super::*;
 
 const SIMULATION: &str = "test";
@@ -112,4 +114,36 @@ fn a_fork_of_another_version_of_the_simulation_begins_without_a_champion() {
     let fork = after_four(&parent).fork(&fork).unwrap();
     assert_eq!(fork.champion(), None);
     assert_ne!(fork.digest(), after_four(&parent).digest());
+}
+
+#[test]
+fn a_fork_of_elites_keeps_the_task_of_their_evidence() {
+    let mut parent = config("NSGA-II", 6, &["a"]);
+    parent.algorithm.aims = vec![AimConfig {
+        measure: "turning".to_owned(),
+        summarises: Summarises::Mean,
+        direction: Direction::Minimise,
+    }];
+    let segments = segments(&[3]);
+    let start = Evolution::new(&parent, &segments, SIMULATION);
+    let forked = |child: &ExperimentConfig, simulation| {
+        let fork = Fork {
+            parent: &parent,
+            parent_simulation: SIMULATION,
+            child,
+            segments: &segments,
+            simulation,
+        };
+        start.clone().fork(&fork).map_err(|error| error.to_string())
+    };
+    let mut longer = parent.clone();
+    longer.algorithm.generations = 99;
+    longer.algorithm.num_evaluations = 7;
+    assert!(forked(&longer, SIMULATION).is_ok());
+    let mut wider = parent.clone();
+    wider.world.height = 500.0;
+    for refusal in [forked(&wider, SIMULATION), forked(&parent, "test 2")] {
+        let refusal = refusal.unwrap_err();
+        assert!(refusal.contains("a fork cannot change the task"), "{refusal}");
+    }
 }

@@ -150,6 +150,22 @@ fn checkpoints_and_logs_restore_a_front_to_the_same_bits() {
     assert_eq!(serde_json::from_str::<Evolution>(&json).unwrap(), evolution);
 }
 
+#[test]
+fn a_front_of_nobody_is_a_notice() {
+    let mut evolution = started(Params::default());
+    let mut notices = Vec::new();
+    for _ in 0..11 {
+        let asked = evolution.ask();
+        let mut told = told(&asked.genotypes);
+        told.descriptors.iter_mut().flatten().for_each(|value| *value = f64::NAN);
+        notices.extend(evolution.learn(asked, &told, |_| None).unwrap().notices);
+    }
+    let places: Vec<&str> =
+        notices.iter().map(|notice| notice.split(':').next().unwrap()).collect();
+    assert_eq!(places, ["generation 0", "generation 9"], "{notices:?}");
+    assert!(notices[0].contains("check the measures in `algorithm.aims`"), "{notices:?}");
+}
+
 /// These bits come from the first version.
 #[test]
 fn the_bits_of_a_front_are_fixed() {

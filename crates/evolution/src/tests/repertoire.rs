@@ -1,6 +1,7 @@
 //! Repertoires: archives given the same behaviours, evidence of many trials, and judgements.
 
 use serde::Deserialize;
+use serde_json::{Value, json};
 
 use super::*;
 use crate::{Corrected, Operator, Pedigree, Setup};
@@ -306,4 +307,71 @@ fn a_large_repertoire_fits_into_a_checkpoint() {
     assert!(keyframe.len() < 32 << 20, "{}", keyframe.len());
     let restored = Evolution::restore(&Checkpoint { keyframe, ..Checkpoint::default() }).unwrap();
     assert_eq!(restored, evolution);
+}
+
+/// Makes a change to the state of an algorithm, and restores what a stranger would write of it.
+fn restored(evolution: &Evolution, change: impl Fn(&mut Value)) -> Result<Evolution, String> {
+    let mut state = serde_json::to_value(&evolution.populations[0]).unwrap();
+    change(state.as_object_mut().unwrap().values_mut().next().unwrap());
+    let populations = vec![serde_json::from_value(state).unwrap()];
+    let keyframe = Evolution { populations, ..evolution.clone() }.keyframe();
+    let checkpoint = Checkpoint { keyframe, ..Checkpoint::default() };
+    Evolution::restore(&checkpoint).map_err(|error| error.to_string())
+}
+
+#[test]
+fn states_whose_parts_contradict_each_other_are_refused() {
+    let aims = vec![Direction::Minimise];
+    let front = Setup { population_size: 20, aims, ..Setup::new("NSGA-II", 3) }.start().unwrap();
+    let repertoires = ["MAP-Elites", "DNS", "novelty", "CMA-MAE", "sep-CMA-MAE"];
+    let repertoires = repertoires.map(|name| started(name, Params::default()));
+    for mut evolution in repertoires.into_iter().chain([front]) {
+        let told = described(&evolution.ask().genotypes);
+        let n = evolution.n_descriptors();
+        let values: Vec<Vec<f64>> = told
+            .values()
+            .iter()
+            .map(|row| row.chunks(3).flat_map(|trial| trial[..1 + n].to_vec()).collect())
+            .collect();
+        evolution.repeat(&Told::from_values(&values, n)).unwrap();
+        assert_eq!(restored(&evolution, |_| {}).as_ref(), Ok(&evolution));
+        let refused = |what: &str, change: &dyn Fn(&mut Value)| {
+            let error = restored(&evolution, change).unwrap_err();
+            assert!(error.contains("not the state of a run"), "{what}: {error}");
+        };
+        let elites: fn(&mut Value) -> &mut Value = |state| match state.get("elites") {
+            Some(_) => &mut state["elites"],
+            None => state,
+        };
+        refused("genes", &|state| elites(state)["kept"][0]["genotype"] = json!(vec![0.5; 4]));
+        refused("descriptors", &|state| {
+            elites(state)["kept"][0]["descriptors"] = json!(vec![0.5; 3])
+        });
+        refused("trials", &|state| elites(state)["kept"][0]["n_trials"] = json!(0));
+        refused("many", &|state| {
+            let kept = &mut elites(state)["kept"];
+            *kept = vec![kept[0].clone(); 100_001].into();
+        });
+        if n == 1 {
+            refused("aims", &|state| state["aims"] = json!(["minimise", "minimise", "minimise"]));
+        } else {
+            refused("axes", &|state| elites(state)["axes"] = json!([]));
+        }
+    }
+}
+
+#[test]
+fn emitters_fit_their_repertoire() {
+    for name in ["CMA-MAE", "sep-CMA-MAE"] {
+        let evolution = started(name, Params::default());
+        let other = Setup { axes: axes(), ..Setup::new(name, 4) }.start().unwrap();
+        let other = serde_json::to_value(&other.populations[0]).unwrap();
+        let emitters = other.as_object().unwrap().values().next().unwrap()["emitters"].clone();
+        for (what, value) in
+            [("emitters", json!([])), ("emitters", emitters), ("thresholds", json!([0.5]))]
+        {
+            let error = restored(&evolution, |state| state[what] = value.clone()).unwrap_err();
+            assert!(error.contains("not the state of a run"), "{what}: {error}");
+        }
+    }
 }

@@ -33,7 +33,7 @@ fn fit(
     if algorithm.learns_from != LearnsFrom::Aims {
         if !config.algorithm.aims.is_empty() {
             report.conflict(path, &[&name_path], || {
-                format!("{name} aims at fitness alone; remove them, or take `NSGA-II`")
+                format!("{name} knows no aims beside fitness; remove them, or take `NSGA-II`")
             });
         }
         return;

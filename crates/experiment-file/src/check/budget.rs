@@ -163,6 +163,14 @@ fn generation(
             let what = "possible genes of all elites";
             let parts = [&topology, &algorithm.key("descriptors"), &algorithm.key("name")];
             limit(cost, limits::GENES_OF_REPERTOIRE, what, &path, &parts, report);
+            if description.compares_behaviours() {
+                let n_pool = n_elites + size;
+                let n_descriptors = config.algorithm.descriptors.len() as u64;
+                let cost = n_pool.saturating_mul(n_pool).saturating_mul(n_descriptors);
+                let what = "distances between behaviours per generation, along all descriptors,";
+                let parts = [&path, &algorithm.key("descriptors"), &algorithm.key("name")];
+                limit(cost, limits::DISTANCES, what, &size_path, &parts, report);
+            }
             let n_judged = n_elites * u64::from(config.algorithm.judgement_trials);
             let what = "trials that judge all elites";
             let path = algorithm.key("judgement_trials");

@@ -73,7 +73,7 @@ fn all_mistakes_of_aims_are_reported_at_once() {
 #[test]
 fn aims_and_algorithm_belong_together() {
     let problem = refuse(&with("GA", &format!(r#""aims": {TURNING},"#)));
-    assert!(problem.contains("GA aims at fitness alone; remove them, or take `NSGA-II`"));
+    assert!(problem.contains("GA knows no aims beside fitness; remove them, or take `NSGA-II`"));
     let problem = refuse(&with("NSGA-II", ""));
     assert!(problem.contains("NSGA-II needs an aim beside fitness, for instance"), "{problem}");
     let three = format!(r#""aims": [{TURNING}, {TURNING}, {TURNING}],"#);

@@ -80,3 +80,22 @@ fn ranges_grids_and_costs_are_checked_together() {
     let problem = refuse(&long);
     assert!(problem.contains("16384000 trials that judge all elites are more than"), "{problem}");
 }
+
+#[test]
+fn distances_between_behaviours_are_limited() {
+    for (name, is_refused) in [("DNS", true), ("novelty", true), ("MAP-Elites", false)] {
+        let three = format!(
+            "{ORDER}, {}, {}",
+            ORDER.replace("end", "mean"),
+            ORDER.replace("order", "speed")
+        );
+        let file = with(name, &format!(r#""descriptors": [{three}],"#));
+        let file = file.replace(r#""population_size": 20"#, r#""population_size": 90000"#);
+        assert!(file.contains("90000"), "{file}");
+        let problems = ExperimentConfig::from_json(&file, "", ALGORITHMS)
+            .err()
+            .map_or(String::new(), |error| error.to_string());
+        let found = problems.contains("distances between behaviours per generation");
+        assert_eq!(found, is_refused, "{name}: {problems}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Answers the reading calls of clients from a database.
 
-use std::{io, path::Path, time::Duration};
+use std::{io, path::Path, sync::Arc, time::Duration};
 
 use prost::Message;
 use swarm_proto::v1;
@@ -28,7 +28,7 @@ const LOOK_EVERY: Duration = Duration::from_secs(2);
 pub struct Reader {
     store: SharedStore,
     /// One permit for each generation that is recomputed.
-    reconstructions: Semaphore,
+    reconstructions: Arc<Semaphore>,
     news: watch::Receiver<u64>,
 }
 
@@ -37,7 +37,7 @@ impl Reader {
     /// same time.
     pub fn new(store: SharedStore, n_reconstructions: usize) -> Self {
         let news = store.news();
-        Self { store, reconstructions: Semaphore::new(n_reconstructions), news }
+        Self { store, reconstructions: Arc::new(Semaphore::new(n_reconstructions)), news }
     }
 
     /// A reader with its own read-only connection to the database in `directory`; `news` changes
@@ -90,10 +90,15 @@ impl Reader {
         query: impl FnOnce(&Store) -> Result<S, QueryError> + Send + 'static,
         compute: impl FnOnce(S) -> Result<T, QueryError> + Send + 'static,
     ) -> Result<T, Status> {
-        let permit = self.reconstructions.acquire().await;
-        let _permit = permit.expect("nobody closes the semaphore");
+        let permit = Arc::clone(&self.reconstructions).acquire_owned().await;
+        let permit = permit.expect("nobody closes the semaphore");
         let stored = self.store.read(query).await?;
-        let computed = task::spawn_blocking(move || compute(stored)).await;
+        // A client that leaves does not end the computation, which keeps its permit.
+        let computed = task::spawn_blocking(move || {
+            let _permit = permit;
+            compute(stored)
+        })
+        .await;
         let panicked = |_| Status::internal("evolution panicked; please report this");
         Ok(computed.map_err(panicked)??)
     }

@@ -142,6 +142,11 @@ impl Elite {
         }
     }
 
+    /// Number of its descriptors.
+    pub fn n_descriptors(&self) -> usize {
+        self.descriptors.len()
+    }
+
     /// Whether all its numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.fitness.is_finite() && self.descriptors.iter().all(|sum| sum.is_finite())

@@ -3,6 +3,16 @@
 use super::Elite;
 use crate::{Birth, Evaluations, Genotype, Parents};
 
+/// Whether kept individuals have this many genes and descriptors, and have met a trial.
+pub fn fit(kept: &[Elite], d: usize, n_descriptors: usize) -> bool {
+    kept.iter().all(|elite| {
+        elite.genotype.len() == d
+            && elite.n_descriptors() == n_descriptors
+            && elite.n_trials > 0
+            && elite.is_finite()
+    })
+}
+
 /// Number of kept individuals that the next generation evaluates again: this share of it.
 pub fn n_again(kept: &[Elite], share: f64, population_size: usize) -> usize {
     let wanted = (share * population_size as f64).round() as usize;

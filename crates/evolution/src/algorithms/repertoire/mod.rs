@@ -16,7 +16,7 @@ use determinism::{
     random::Stream,
     simd::{Simd, WithSimd},
 };
-use experiment_file::{AlgorithmDescription, Direction, Parameter, Params};
+use experiment_file::{AlgorithmDescription, Direction, Parameter, Params, limits};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 pub use elite::{Axis, Elite, Evidence};
@@ -66,6 +66,11 @@ pub trait Rule: Sized {
     /// that is drawn does.
     fn merits(&self, _kept: &[Evidence]) -> Option<Vec<f64>> {
         None
+    }
+
+    /// Time of its decisions in a generation, ns, if it is longer than that of drawing.
+    fn search_ns(&self, _n_pool: u64, _n_axes: u64) -> u64 {
+        0
     }
 }
 
@@ -215,6 +220,15 @@ pub trait Behaviours {
     /// The elites, in the order in which they came.
     fn elites(&self) -> Vec<&Elite>;
 
+    /// Whether its parts fit each other and the limits. A state of a run does; one that a stranger
+    /// made may claim sizes that would exhaust memory or time.
+    fn is_sound(&self) -> bool;
+
+    /// Time to ask for and tell a generation beyond that per gene, ns.
+    fn search_ns(&self, _population_size: u64) -> u64 {
+        0
+    }
+
     /// Draws `population_size` individuals. A pure function of the state and the stream.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample;
 
@@ -238,6 +252,18 @@ impl<R: Rule + Serialize + DeserializeOwned> Behaviours for Repertoire<R> {
 
     fn axes(&self) -> &[Axis] {
         &self.axes
+    }
+
+    fn is_sound(&self) -> bool {
+        let is_axis = |axis: &Axis| axis.low < axis.high && axis.n_cells > 0;
+        (1..=limits::DESCRIPTORS).contains(&self.axes.len())
+            && self.axes.iter().all(is_axis)
+            && self.kept.len() <= limits::ELITES as usize
+            && kept::fit(&self.kept, self.d, self.axes.len())
+    }
+
+    fn search_ns(&self, population_size: u64) -> u64 {
+        self.rule.search_ns(self.kept.len() as u64 + population_size, self.axes.len() as u64)
     }
 
     fn elites(&self) -> Vec<&Elite> {

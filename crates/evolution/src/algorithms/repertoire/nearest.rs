@@ -41,11 +41,13 @@ impl Nearest {
     }
 }
 
-/// Behaviours in the order of their first coordinates, so that a search ends where no nearer one
-/// can follow.
+/// Behaviours in the order of the coordinate that tells most of them apart, so that a search ends
+/// where no nearer one can follow.
 pub struct Neighbours {
     /// The coordinates of all behaviours in that order; shape `[axis][rank]`.
     axes: Vec<Vec<f64>>,
+    /// The axis of the order.
+    widest: usize,
     /// The place in the pool of each rank, and the rank of each place.
     places: Vec<usize>,
     ranks: Vec<usize>,
@@ -57,25 +59,26 @@ const BLOCK: usize = 16;
 impl Neighbours {
     /// The neighbours of everyone in a pool.
     pub fn new(pool: &[Evidence]) -> Self {
-        let first = |place: usize| pool[place].point.first().copied().unwrap_or(0.0);
+        let n_axes = pool.first().map_or(0, |own| own.point.len());
+        let widest = widest(pool, n_axes);
+        let along = |place: usize| pool[place].point.get(widest).copied().unwrap_or(0.0);
         let mut places: Vec<usize> = (0..pool.len()).collect();
-        places.sort_by(|&a, &b| first(a).total_cmp(&first(b)));
+        places.sort_by(|&a, &b| along(a).total_cmp(&along(b)));
         let mut ranks = vec![0; pool.len()];
         places.iter().enumerate().for_each(|(rank, &place)| ranks[place] = rank);
-        let n_axes = pool.first().map_or(0, |own| own.point.len());
         let axis = |axis: usize| places.iter().map(|&place| pool[place].point[axis]).collect();
-        Self { axes: (0..n_axes).map(axis).collect(), places, ranks }
+        Self { axes: (0..n_axes).map(axis).collect(), widest, places, ranks }
     }
 
     /// Mean distance from the individual at this place to the `k` nearest others that `counts`
     /// accepts by their places; to all of them, if they are fewer; infinite without any.
     pub fn distance(&self, place: usize, k: usize, counts: impl Fn(usize) -> bool) -> f64 {
         let (rank, n) = (self.ranks[place], self.places.len());
-        let mut nearest = Nearest::new(k);
+        let mut nearest = Nearest::new(k.min(n));
         let (mut low, mut high) = (rank, rank + 1);
         let (mut is_below, mut is_above) = (true, true);
         while is_below || is_above {
-            // No distance is shorter than its part along the first coordinate.
+            // No distance is shorter than its part along a coordinate.
             is_below = low > 0 && !self.is_beyond(rank, low - 1, &nearest);
             if is_below {
                 let start = low.saturating_sub(BLOCK);
@@ -93,8 +96,8 @@ impl Neighbours {
     }
 
     fn is_beyond(&self, rank: usize, other: usize, nearest: &Nearest) -> bool {
-        let Some(first) = self.axes.first() else { return false };
-        let gap = first[other] - first[rank];
+        let Some(along) = self.axes.get(self.widest) else { return false };
+        let gap = along[other] - along[rank];
         gap * gap > nearest.limit()
     }
 
@@ -119,6 +122,18 @@ impl Neighbours {
             }
         }
     }
+}
+
+/// The axis with the largest standard deviation within the grid, the first of equals.
+fn widest(pool: &[Evidence], n_axes: usize) -> usize {
+    let variance = |axis: usize| {
+        let values = pool.iter().map(|individual| individual.point[axis].clamp(0.0, 1.0));
+        let (sum, squares) = values.fold((0.0, 0.0), |(s, q), x| (s + x, q + x * x));
+        squares - sum * sum / pool.len() as f64
+    };
+    let variances: Vec<f64> = (0..n_axes).map(variance).collect();
+    let largest = variances.iter().copied().fold(0.0, f64::max);
+    variances.iter().position(|variance| *variance == largest).unwrap_or(0)
 }
 
 /// Squared Euclidean distance.
