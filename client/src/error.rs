@@ -82,8 +82,9 @@ pub enum Error {
     WrongState(String),
     /// The coordinator did not answer within the patience.
     #[error(
-        "cannot reach a coordinator at {address}: {reason}; start one with `coordinator`, or set \
-         its address with --coordinator, SWARM_COORDINATOR or the settings file"
+        "cannot reach a coordinator at {address}: {reason}; without a fleet, go to the directory that \
+         contains ./swarm-data, or name one with --data-dir; with a fleet, start one with \
+         `coordinator`, or set its address with --coordinator, SWARM_COORDINATOR or the settings file"
     )]
     Unreachable {
         /// The coordinator's address.

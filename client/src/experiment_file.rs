@@ -14,6 +14,7 @@ use crate::{
     change::{Change, Json, apply_all},
     clock,
     error::{Code, Error, prefix_lines},
+    examples::EXAMPLES,
     file_kind::{self, Kind},
     input::{is_stdin, read_text},
     interrupt, json,
@@ -77,7 +78,7 @@ impl ExperimentFile {
         let unreadable = |message| problem(Code::UnreadableFile, "", message);
         file_kind::expect(path, &[Kind::Experiment], "an experiment file").map_err(unreadable)?;
         let text = read_text(path, limits::FILE_BYTES)
-            .map_err(|error| unreadable(format!("cannot be read: {error}")))?;
+            .map_err(|error| unreadable(format!("cannot be read: {error}{}", hint(path))))?;
         let Some((script, place)) = script_path(&text) else {
             return Ok(Self { path: path.into(), text });
         };
@@ -205,6 +206,20 @@ impl Overrides {
 }
 
 /// The problems of a generated text, without line numbers.
+/// The next step after the path of a file that is not there, if the user meant something else.
+fn hint(path: &Path) -> String {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    if path.exists() {
+        String::new()
+    } else if EXAMPLES.iter().any(|example| example.name == name) {
+        format!("; an example has this name: run --example {name}")
+    } else if name.contains('@') {
+        "; the address of an individual is ID@G/I, such as 1@0/17".to_owned()
+    } else {
+        String::new()
+    }
+}
+
 fn without_lines(mut error: ConfigError) -> ConfigError {
     error.problems.iter_mut().for_each(|problem| problem.line = None);
     error

@@ -179,10 +179,10 @@ impl Kind {
             Self::DataDirectory => command(&["swarmctl", "list", "--data-dir", "{}"]),
             Self::Settings => "name it with the variable SWARM_CONFIG".into(),
             Self::Dynamics | Self::List | Self::Workers | Self::Trace => {
-                "it is for other programs".into()
+                "this one is for other programs".into()
             }
-            Self::Schema => "it is for editors".into(),
-            Self::Figure | Self::Replay => "it is for people".into(),
+            Self::Schema => "this one is for editors".into(),
+            Self::Figure | Self::Replay => "this one is for people".into(),
         }
     }
 }

@@ -163,9 +163,9 @@ pub fn identical(
 /// A submitted experiment, on one line.
 pub fn submitted(experiment: &Experiment) -> String {
     format!(
-        "{}: {} generations of {} by {}, {} genes, seed {}",
+        "{}: {} of {} by {}, {} genes, seed {}",
         title(experiment),
-        experiment.generations,
+        counted(experiment.generations, "generation"),
         experiment.population_size,
         experiment.algorithm,
         experiment.genotype_len,
@@ -258,6 +258,10 @@ fn champion_line(champion: &GetChampionResponse) -> String {
         None => format!("mean after generation {generation}"),
     };
     match &champion.judged {
+        // A single trial has no interval.
+        Some(JudgedFitness { mean, trials: 1, .. }) => {
+            format!("{}, on 1 new trial ({source})", number(*mean, 6))
+        }
         Some(JudgedFitness { mean, low, high, trials, .. }) => {
             let [mean, low, high] = [mean, low, high].map(|value| number(*value, 6));
             format!("{mean}, 95 % {low} to {high}, on {trials} new trials ({source})")

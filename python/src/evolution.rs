@@ -206,9 +206,9 @@ impl Evolution {
         let values: Vec<Vec<f64>> = elites.iter().map(|(_, values, _)| values.clone()).collect();
         let born = elites.iter().map(|(.., born)| *born).collect();
         // Without elites, arrays still have their columns.
-        let (d, n_aims) = self.0.with(py, |state| {
-            (state.evolution.n_genes(), state.evolution.n_descriptors())
-        })?;
+        let (d, n_aims) = self
+            .0
+            .with(py, |state| (state.evolution.n_genes(), state.evolution.n_descriptors()))?;
         let array = |rows: &[Vec<f64>], n_columns| match rows {
             [] => Ok(PyArray2::zeros(py, [0, n_columns], false)),
             rows => PyArray2::from_vec2(py, rows),

@@ -37,8 +37,8 @@ export function difference(before, after, interventions) {
   if (isSameSwarm) {
     const touched = new Set(interventions.filter((it) => it.kind === "robot").map((it) => it.number));
     const first = firstOther(before, after, touched);
-    const others = touched.size > 0 && touched.size < before.n_robots ? "other robot" : "robot";
-    if (first === null) sentences.push(`No ${others} does anything else.`);
+    const others = touched.size > 0 && touched.size < before.n_robots ? "other robots" : "robots";
+    if (first === null) sentences.push(`All ${others} act exactly as before.`);
     else {
       const last = before.steps - 1;
       const away = Array.from({ length: before.n_robots }, (_, robot) => {

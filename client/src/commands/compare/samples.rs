@@ -1,7 +1,7 @@
 //! Samples: runs of the same experiment that differ in their seed.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
@@ -126,7 +126,8 @@ impl Samples {
     ) -> Result<(), Error> {
         let experiments = connection.subject(subject).await?;
         let n_all = experiments.len() as u64;
-        for (n_done, experiment) in experiments.into_iter().enumerate() {
+        let names = names(&experiments);
+        for (n_done, (experiment, name)) in experiments.into_iter().zip(names).enumerate() {
             progress.step(n_done as u64, n_all, "histories are read");
             if experiment.state() != ExperimentState::Completed {
                 let line = text::state_line(&experiment);
@@ -134,11 +135,15 @@ impl Samples {
                 continue;
             }
             let history = Run::fetch(connection, experiment.clone()).await?.points;
-            let name = name(&experiment);
             let run = self.run(&name, experiment.seed);
             run.sources.push(format!("experiment {}", experiment.id));
             if run.history.is_some() {
-                let problem = format!("{name}, seed {}: {}", experiment.seed, twice(run));
+                let problem = format!(
+                    "{name}, seed {}: {}; name the runs to compare by their numbers, or delete one of \
+                     them",
+                    experiment.seed,
+                    twice(run)
+                );
                 self.problems.push(problem);
                 continue;
             }
@@ -185,6 +190,25 @@ fn twice(run: &RecordedRun) -> String {
     format!("the run is given twice: {}", run.sources.join(", "))
 }
 
+/// The names of the samples of experiments: with the number of generations where a sample would
+/// have a seed twice.
+fn names(experiments: &[Experiment]) -> Vec<String> {
+    let names: Vec<String> = experiments.iter().map(name).collect();
+    let mut seen = BTreeSet::new();
+    let runs = experiments.iter().zip(&names);
+    let twice: BTreeSet<&String> = runs
+        .filter(|(experiment, name)| !seen.insert((*name, experiment.seed)))
+        .map(|(_, name)| name)
+        .collect();
+    let named = |(experiment, name): (&Experiment, &String)| match twice.contains(name) {
+        true => {
+            format!("{name}, {}", text::counted(experiment.generations, "generation"))
+        }
+        false => name.clone(),
+    };
+    experiments.iter().zip(&names).map(named).collect()
+}
+
 /// Runs of a group form a sample if they are of the same variant, other runs if they have
 /// the same name.
 fn name(experiment: &Experiment) -> String {
@@ -192,5 +216,24 @@ fn name(experiment: &Experiment) -> String {
         ("", _) => experiment.name.clone(),
         (group, "") => group.to_owned(),
         (group, variant) => format!("{group} {variant}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_one_seed_and_several_lengths_are_several_samples() {
+        let run = |group: &str, seed, generations| Experiment {
+            name: "alone".into(),
+            group: group.into(),
+            seed,
+            generations,
+            ..Experiment::default()
+        };
+        let runs = [run("a", 0, 2), run("a", 1, 2), run("a", 0, 1), run("b", 0, 2), run("", 0, 2)];
+        let expected = ["a, 2 generations", "a, 2 generations", "a, 1 generation", "b", "alone"];
+        assert_eq!(names(&runs), expected);
     }
 }

@@ -25,7 +25,7 @@ use crate::{
 pub struct SimulateArgs {
     /// The experiment file; or a genotype, which is simulated with the file of its experiment, in
     /// the worlds of its generation: ID or NAME, the champion; ID@G/I, individual I of generation
-    /// G; ID@G/mean, the mean of the distribution after it.
+    /// G; ID@G/mean, the mean of the distribution after it; 'ID@G/cell(A,B)', the elite of a cell.
     #[arg(value_name = "CONFIG|ADDRESS", add = ArgValueCompleter::new(complete::experiments_and_files))]
     pub subject: PathBuf,
     /// File with the genotype: a JSON list of genes, or an object with a `genotype`,

@@ -121,7 +121,7 @@ pub enum QueryError {
     },
     /// A reference point has other numbers than the aims.
     #[error(
-        "the reference point has {found} numbers, but needs {expected} finite ones: for {aims}"
+        "the reference point needs {expected} finite numbers ({aims}), not {found} of any kind"
     )]
     WrongReference {
         /// Its length.
