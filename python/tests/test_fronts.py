@@ -126,7 +126,7 @@ def test_a_reference_point_makes_volumes_comparable(run):
     reference = (run.front()["judged_fitness"].min() - 1, 5)
     elites = run.front(reference=reference)
     assert elites.attrs["reference"] == reference and elites.attrs["hypervolume"] > 1
-    with pytest.raises(swarmevo.RefusedArgument, match="needs 2 finite ones: for fitness, together"):
+    with pytest.raises(swarmevo.RefusedArgument, match="needs 2 finite numbers, for fitness, together"):
         run.front(reference=[1.0])
 
 

@@ -76,7 +76,11 @@ fn elites_of_a_front_are_judged_and_have_addresses() {
     let before = coordinator.swarmctl(&["front", "1@2"]).expect_success().json();
     assert!(before["figures"]["stay"].is_null() && before["elites"][0]["judged"].is_null());
     for (args, code, what) in [
-        (&["front", "1", "--reference", "1"][..], 2, "needs 2 finite ones: for fitness, leaders"),
+        (
+            &["front", "1", "--reference", "1"][..],
+            2,
+            "needs 2 finite numbers, for fitness, leaders; it has 1",
+        ),
         (&["front", "2"], 2, "has no front: SNES evolves none; NSGA-II does"),
         (&["repertoire", "1"], 2, "has no repertoire: NSGA-II evolves none"),
         (&["front", "1@9"], 3, "generation 9 of experiment 1 is not complete"),

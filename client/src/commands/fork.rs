@@ -28,7 +28,8 @@ use super::watch;
 /// The new experiment shares the history of its parent up to that generation, and continues
 /// from the parent's state. Fitness, world, perturbations, the number of robots, trials or
 /// individuals and the seed may change; the algorithm, its parameters and the length of
-/// genotypes may not. All later digests cover the changes; a fork without changes has the
+/// genotypes may not. Of a repertoire or a front, fitness and world may not either, because its
+/// elites keep the evidence of their trials. All later digests cover the changes; a fork without changes has the
 /// digests of its parent.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]

@@ -32,7 +32,7 @@ const form = element("form", {
   },
 },
   element("h1", {}, "swarmevo"),
-  element("p", {}, "The token that clients of this coordinator use:"),
+  element("p", {}, "The part after # of the address that the program printed, or a coordinator's client token:"),
   field, element("button", { type: "submit" }, "Log in"));
 main.replaceChildren(form);
 field.focus();

@@ -20,6 +20,13 @@ export function proofForm(known = null) {
   const status = element("p", { id: "status", className: "muted" });
   const result = element("div", { id: "proof", role: "status" });
 
+  simulator.then((module) => {
+    if (module) return;
+    input.disabled = sample.disabled = true;
+    result.replaceChildren(element("p", { className: "flaw", id: "without" }, WITHOUT));
+    // `begin` shows a failure.
+  }, () => {});
+
   const choose = async (file) => begin(file.name, new Uint8Array(await file.arrayBuffer()));
 
   async function begin(name, bytes) {

@@ -120,9 +120,7 @@ pub enum QueryError {
         algorithm: String,
     },
     /// A reference point has other numbers than the aims.
-    #[error(
-        "the reference point needs {expected} finite numbers ({aims}), not {found} of any kind"
-    )]
+    #[error("the reference point needs {expected} finite numbers, for {aims}; it has {found}")]
     WrongReference {
         /// Its length.
         found: usize,
