@@ -351,7 +351,7 @@ class Live(BrowserTest):
         fleet = Fleet(environment=tokens)
         self.addCleanup(fleet.stop)
         self.browser.get(fleet.pages + "/fleet")
-        self.wait_for_text("form", "The token that clients")
+        self.wait_for_text("form", "client token")
         for token in [WORKER_TOKEN, CLIENT_TOKEN]:
             field = self.find("#token")
             field.clear()
