@@ -3,7 +3,8 @@
 //! Deb, Pratap, Agarwal, Meyarivan: "A fast and elitist multiobjective genetic algorithm: NSGA-II",
 //! IEEE Transactions on Evolutionary Computation 6 (2002). The ranks are those of the paper; they
 //! are found by binary search among the fronts (Zhang et al.: "An efficient approach to
-//! nondominated sorting", ibid. 19 (2015)).
+//! nondominated sorting", ibid. 19 (2015)), of which only those members are searched that no
+//! other one beats in second and third cost.
 //!
 //! An individual is a list of *costs*, one per aim, of which less is better. They are finite and
 //! have no negative zero ([`costs`](crate::front::costs)).

@@ -20,11 +20,10 @@ pub fn hypervolume(costs: &[Vec<f64>], reference: &[f64]) -> f64 {
     for (i, &[x, y, z]) in points.iter().enumerate() {
         stairs.add([x, y]);
         let next = points.get(i + 1).map_or(end, |next| next[2]);
-        // The area of values near the largest number is infinite, and 0 times that is no number.
-        if next > z {
-            volume += stairs.area * (next - z);
-        }
+        volume += stairs.area * (next - z);
     }
+    // Near the largest number, areas are infinite, and no number in slices without depth: `min`
+    // returns the largest number in both cases.
     volume.min(f64::MAX)
 }
 

@@ -461,4 +461,5 @@ fn keyframes_are_as_far_apart_as_time_and_room_allow() {
     }
     assert_eq!(interval("GA", 10_000, 455, 5), 88, "keyframes take as much room as the log");
     assert_eq!(interval("CMA-ES", 100, 1000, 5), 61, "keyframes take 128 KiB per generation");
+    assert_eq!(interval("NSGA-II", 16_384, 2, 1), 6, "sorting takes longer than drawing");
 }

@@ -356,6 +356,7 @@ fn states_whose_parts_contradict_each_other_are_refused() {
             refused("aims", &|state| state["aims"] = json!(["minimise", "minimise", "minimise"]));
         } else {
             refused("axes", &|state| elites(state)["axes"] = json!([]));
+            refused("cells", &|state| elites(state)["axes"][0]["n_cells"] = json!(u32::MAX));
         }
     }
 }

@@ -145,3 +145,30 @@ impl BlockingReader {
         self.runtime.block_on(self.reader.call(name, request))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_computation_keeps_its_permit_when_its_client_leaves() {
+        let directory = tempfile::tempdir().unwrap();
+        let reader = Reader::new(SharedStore::new(Store::open(directory.path()).unwrap()), 1);
+        let (started, mut is_started) = tokio::sync::mpsc::channel(1);
+        let (end, is_over) = mpsc::channel::<()>();
+        let compute = move |()| {
+            started.blocking_send(()).unwrap();
+            is_over.recv().unwrap();
+            Ok(())
+        };
+        tokio::select! {
+            _ = reader.reconstruct(|_| Ok(()), compute) => panic!("it waits"),
+            _ = is_started.recv() => {}
+        }
+        assert_eq!(reader.reconstructions.available_permits(), 0);
+        end.send(()).unwrap();
+        drop(reader.reconstructions.acquire().await.unwrap());
+    }
+}

@@ -162,3 +162,12 @@ fn numbers_that_are_not_finite_raise_no_threshold_and_rank_last() {
     assert_eq!(state.thresholds, before.thresholds);
     assert_eq!(state.emitters, before.emitters, "nobody can be ranked");
 }
+
+#[test]
+fn at_a_rate_of_zero_no_number_moves_a_threshold() {
+    let mut state = started(1);
+    state.archive_rate = 0.0;
+    let before = state.thresholds.clone();
+    state.raise(&[Some((0, f64::MAX)), Some((0, f64::MAX)), Some((1, 1.0))]);
+    assert_eq!(state.thresholds, before);
+}

@@ -256,8 +256,10 @@ impl<R: Rule + Serialize + DeserializeOwned> Behaviours for Repertoire<R> {
 
     fn is_sound(&self) -> bool {
         let is_axis = |axis: &Axis| axis.low < axis.high && axis.n_cells > 0;
+        let n_cells = |n: u64, axis: &Axis| n.saturating_mul(axis.n_cells.into());
         (1..=limits::DESCRIPTORS).contains(&self.axes.len())
             && self.axes.iter().all(is_axis)
+            && self.axes.iter().fold(1, n_cells) <= limits::ELITES.into()
             && self.kept.len() <= limits::ELITES as usize
             && kept::fit(&self.kept, self.d, self.axes.len())
     }

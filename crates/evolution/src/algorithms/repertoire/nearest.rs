@@ -192,6 +192,8 @@ mod tests {
         let neighbours = Neighbours::new(&pool);
         let distance = |place, k| neighbours.distance(place, k, |_| true);
         assert_eq!([distance(0, 1), distance(0, 2), distance(4, 2)], [0.0, 0.5, 1.0]);
+        // A stranger may ask for any number of neighbours.
+        assert_eq!(distance(0, 1 << 60), distance(0, 4));
         assert_eq!([distance(2, 1), distance(0, 4)], [f64::INFINITY; 2]);
     }
 }
