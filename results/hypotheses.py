@@ -40,9 +40,10 @@ GA_NETWORK = {
     },
 }
 ROBOT = "world.objects.robotA."
+SENSORS = ROBOT + "sensors."
 LONG_RADIO = {
-    ROBOT + "sensors.wireless_receiver.range": 150,
-    ROBOT + "sensors.wireless_receiver.msg_length": 3,
+    SENSORS + "wireless_receiver.range": 150,
+    SENSORS + "wireless_receiver.msg_length": 3,
     ROBOT + "actuators.wireless_transmitter.range": 150,
     ROBOT + "actuators.wireless_transmitter.msg_length": 3,
     "topology.stimuli.I1.n": 3,
@@ -73,6 +74,8 @@ VARIANTS = {
         "radio of 150 cm, messages of 3": LONG_RADIO,
         "first deviation 0.2": {GA + "sigma_init": 0.2},
         "wheels from -1 to 1": {"topology.ensembles.OUT_WHEELS.activation": "tanh"},
+        "Table 3.2's decay": {SENSORS + sensor + ".decay_rho": 0.05 for sensor in ("light_sensor", "wireless_receiver")},
+        "Table 3.2's noise": {SENSORS + "light_sensor.noise_variance": 0.1},
     },
 }
 AS_IT_IS = "as it is"
