@@ -1,5 +1,7 @@
 //! Tables: as wide as the terminal allows, or CSV.
 
+use std::borrow::Cow;
+
 use console::{Style, Term, measure_text_width, truncate_str};
 use serde::Serialize;
 use serde_json::Value;
@@ -15,6 +17,8 @@ const FORMULA_STARTS: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 const COLUMN_WIDTH_MIN: usize = 8;
 /// Columns of text keep this width as long as other columns can be left out.
 const TEXT_WIDTH: usize = 32;
+/// The same for columns of names, whose two ends tell them apart.
+const NAME_WIDTH: usize = 20;
 
 /// The terminal of standard output.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -43,13 +47,22 @@ fn width(term: &Term) -> Option<usize> {
     term.size_checked().filter(|_| term.is_term()).map(|(_, width)| width.into())
 }
 
+/// The part of a cell that is left out if space is short.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cut {
+    Nothing,
+    End,
+    /// Names often differ at their ends.
+    Middle,
+}
+
 /// A column's heading and properties.
 #[derive(Debug, Clone)]
 pub struct Column {
     heading: String,
     is_number: bool,
     is_wide: bool,
-    is_cuttable: bool,
+    cut: Cut,
     /// If space is short, columns are left out, the largest rank first; 0: never.
     drop_rank: u8,
     paint: fn(&str) -> Style,
@@ -63,7 +76,7 @@ impl Column {
             heading,
             is_number: false,
             is_wide: false,
-            is_cuttable: false,
+            cut: Cut::Nothing,
             drop_rank: 0,
             paint: |_| Style::new(),
         }
@@ -76,7 +89,12 @@ impl Column {
 
     /// A column of text that may be cut if space is short.
     pub fn text(heading: &str) -> Self {
-        Self { is_cuttable: true, ..Self::new(heading) }
+        Self { cut: Cut::End, ..Self::new(heading) }
+    }
+
+    /// A column of names, which lose their middle if space is short.
+    pub fn name(heading: &str) -> Self {
+        Self { cut: Cut::Middle, ..Self::new(heading) }
     }
 
     /// Shown with `--output wide` only.
@@ -149,7 +167,7 @@ impl Table {
                     let column = &self.columns[i];
                     let style =
                         if i_line == 0 { Style::new().bold() } else { (column.paint)(&row[i]) };
-                    let text = truncate_str(&row[i], width, ELLIPSIS);
+                    let text = cut(&row[i], width, column.cut);
                     let room = " ".repeat(width - measure_text_width(&text));
                     let text = style.force_styling(screen.has_colours).apply_to(text);
                     if column.is_number { format!("{room}{text}") } else { format!("{text}{room}") }
@@ -168,9 +186,10 @@ impl Table {
     /// Leaves out columns until the others fit the screen.
     fn drop_columns(&self, shown: &mut Vec<usize>, screen_width: Option<usize>) {
         let Some(screen_width) = screen_width else { return };
-        let width = |i: usize| match self.columns[i].is_cuttable {
-            true => self.width(i).min(TEXT_WIDTH),
-            false => self.width(i),
+        let width = |i: usize| match self.columns[i].cut {
+            Cut::Nothing => self.width(i),
+            Cut::End => self.width(i).min(TEXT_WIDTH),
+            Cut::Middle => self.width(i).min(NAME_WIDTH),
         };
         loop {
             let gaps = GAP.len() * shown.len().saturating_sub(1);
@@ -202,7 +221,7 @@ impl Table {
             return widths;
         };
         while widths.iter().sum::<usize>() > room {
-            let cuttable = (0..shown.len()).filter(|&i| self.columns[shown[i]].is_cuttable);
+            let cuttable = (0..shown.len()).filter(|&i| self.columns[shown[i]].cut != Cut::Nothing);
             let Some(widest) = cuttable.max_by_key(|&i| widths[i]) else { break };
             if widths[widest] <= COLUMN_WIDTH_MIN {
                 break;
@@ -211,6 +230,19 @@ impl Table {
         }
         widths
     }
+}
+
+/// A text of at most `width` columns.
+fn cut(text: &str, width: usize, part: Cut) -> Cow<'_, str> {
+    if part != Cut::Middle || measure_text_width(text) <= width {
+        return truncate_str(text, width, ELLIPSIS);
+    }
+    let room = width.saturating_sub(measure_text_width(ELLIPSIS));
+    let start = truncate_str(text, room.div_ceil(2), "");
+    let room = room - measure_text_width(&start);
+    let mut ends = text.char_indices().map(|(at, _)| &text[at..]);
+    let end = ends.find(|end| measure_text_width(end) <= room).unwrap_or_default();
+    Cow::Owned(format!("{start}{ELLIPSIS}{end}"))
 }
 
 /// Records as CSV (RFC 4180, but for the line ends), one column per key; `a.b` is the value `b` of
@@ -311,6 +343,18 @@ mod tests {
         }
         assert!(on(Some(30)).ends_with("12  failed   größe 漢字 of a …"), "{}", on(Some(30)));
         assert!(on(Some(12)).contains("12  failed"), "numbers and states are cut last");
+    }
+
+    #[test]
+    fn names_keep_both_ends() {
+        let name = "flocking_漢字_ga";
+        for width in 1..=measure_text_width(name) {
+            let cut = cut(name, width, Cut::Middle);
+            assert!(measure_text_width(&cut) <= width, "{width}: {cut}");
+        }
+        assert_eq!(cut(name, 9, Cut::Middle), "floc…_ga");
+        assert_eq!(cut(name, 11, Cut::Middle), "flock…字_ga");
+        assert_eq!(cut(name, 40, Cut::Middle), name);
     }
 
     #[test]

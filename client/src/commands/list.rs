@@ -125,11 +125,11 @@ fn table(experiments: &[Experiment], now_ms: u64) -> Table {
         Column::number("genes").wide(),
         Column::new("submitted").wide(),
         shown_if(has_groups, Column::new("group").dropped(7)),
-        shown_if(has_variants, Column::text("variant").dropped(8)),
+        shown_if(has_variants, Column::name("variant").dropped(8)),
         shown_if(has_labels, Column::text("labels").dropped(9)),
         Column::new("archived").wide(),
         Column::new("forked from").wide(),
-        Column::text("name"),
+        Column::name("name"),
         Column::text("reason").wide(),
         Column::text("changes").wide(),
     ]);

@@ -145,7 +145,7 @@ impl Remote for WorkersArgs {
 fn table(workers: &[Worker], now_ms: u64) -> Table {
     let mut table = Table::new([
         Column::number("id"),
-        Column::text("name"),
+        Column::name("name"),
         Column::new("version").dropped(6),
         Column::number("slots").dropped(4),
         Column::number("items").dropped(3),

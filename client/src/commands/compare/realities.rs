@@ -142,7 +142,7 @@ impl Ranking {
     /// For people: a table, the best in the realities first, and tau.
     pub fn to_parts(&self) -> Vec<Part> {
         let mut table = Table::new([
-            Column::text("evaluation"),
+            Column::name("evaluation"),
             Column::number("nominal"),
             Column::number("rank"),
             Column::number("realities"),

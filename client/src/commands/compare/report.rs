@@ -150,7 +150,7 @@ impl Quantity {
     fn to_parts(&self) -> Vec<Part> {
         let digits = if self.less_is_better { 0 } else { 3 };
         let mut table = Table::new([
-            Column::text(self.name),
+            Column::name(self.name),
             Column::number("runs").dropped(1),
             Column::number("median"),
             Column::number("95 %"),
@@ -179,11 +179,11 @@ impl Quantity {
         let mut parts = vec![Part::Text(heading), Part::Table(table)];
         if !self.pairs.is_empty() {
             let mut table = Table::new([
-                Column::text("better"),
-                Column::text("than"),
+                Column::name("better"),
+                Column::name("than"),
                 Column::number("probability"),
                 Column::number("95 %").dropped(1),
-                Column::number("p").dropped(2),
+                Column::number("p"),
             ]);
             for pair in &self.pairs {
                 let probability = &pair.probability_of_improvement;
