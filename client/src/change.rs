@@ -192,6 +192,29 @@ impl Change {
     }
 }
 
+impl Change {
+    /// This path, which the file lacks, and the only place of the file whose path ends with it.
+    pub fn elsewhere(&self, file: &Json) -> Option<(String, String)> {
+        let keys: Vec<&str> = self.path.split('.').collect();
+        let mut found = Vec::new();
+        ending_in(&keys, file, String::new(), &mut found);
+        match &found[..] {
+            [place] if *place != self.path => Some((self.path.clone(), place.clone())),
+            _ => None,
+        }
+    }
+}
+
+/// Collects the paths of the places that end with `keys`.
+fn ending_in(keys: &[&str], place: &Json, path: String, found: &mut Vec<String>) {
+    if place.get(keys.iter().copied()).is_some() {
+        found.push(format!("{path}{}", keys.join(".")));
+    }
+    for (key, inner) in place.object().into_iter().flatten() {
+        ending_in(keys, inner, format!("{path}{key}."), found);
+    }
+}
+
 impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = self.value.text().map_or_else(|| json::line(&self.value), str::to_owned);

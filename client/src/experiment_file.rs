@@ -103,17 +103,31 @@ impl ExperimentFile {
         read(&self.text)?;
         let mut file = Json::parse(&plain(&self.text));
         let missing: Vec<_> = changes.iter().filter_map(|change| change.missing(&file)).collect();
+        let elsewhere: Vec<_> =
+            changes.iter().filter_map(|change| change.elsewhere(&file)).collect();
         apply_all(changes, &mut file).map_err(|problems| ConfigError {
             problems: problems.into_iter().map(unlocated).collect(),
         })?;
         let text = json::line(&file);
         match read(&text).map_err(without_lines) {
             Ok(_) => Ok(Self { path: self.path.clone(), text }),
-            // If the name of an object is a mistake, other problems of that object do not matter.
             Err(mut error) => {
-                for (path, message) in missing {
-                    error.problems.retain(|problem| !problem.path.starts_with(&path));
-                    error.problems.push(Problem { path, line: None, message });
+                let is_set =
+                    |path: &str| changes.iter().any(|change| is_within(path, &change.path));
+                for (object, message) in missing {
+                    let is_of_object = |problem: &Problem| is_within(&problem.path, &object);
+                    let mut problems = error.problems.iter().filter(|of| is_of_object(of));
+                    // An object that lacks more than was set is a mistake in its name.
+                    if problems.any(|problem| !is_set(&problem.path)) {
+                        error.problems.retain(|problem| !is_of_object(problem));
+                        error.problems.push(Problem { path: object, line: None, message });
+                    }
+                }
+                for (path, place) in elsewhere {
+                    for problem in error.problems.iter_mut().filter(|problem| problem.path == path)
+                    {
+                        problem.message = format!("{}; did you mean `{place}`?", problem.message);
+                    }
                 }
                 Err(error)
             }
@@ -205,7 +219,11 @@ impl Overrides {
     }
 }
 
-/// The problems of a generated text, without line numbers.
+/// Whether a path is that of the object, or of a place in it.
+fn is_within(path: &str, object: &str) -> bool {
+    path.strip_prefix(object).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
 /// The next step after the path of a file that is not there, if the user meant something else.
 fn hint(path: &Path) -> String {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -220,6 +238,7 @@ fn hint(path: &Path) -> String {
     }
 }
 
+/// The problems of a generated text, without line numbers.
 fn without_lines(mut error: ConfigError) -> ConfigError {
     error.problems.iter_mut().for_each(|problem| problem.line = None);
     error
@@ -356,6 +375,29 @@ pub mod tests {
         let error = file.changed(&[Change::new(path, Json::from(3))]).unwrap_err();
         let expected = "world.objects.robotA: the file has none; it has `robot`";
         assert_eq!(error.to_string(), expected);
+    }
+
+    #[test]
+    fn a_wrong_value_in_an_object_that_the_file_lacks_is_at_fault_itself() {
+        let mut file = ExperimentFile::read(&quickstart()).unwrap();
+        let params = ",\n                \"params\": {\"encoding\": \"real\"}";
+        file.text = file.text.replace(params, "");
+        let path = "algorithm.populations.network.params.eta_sigma";
+        assert!(
+            Change::new(path.into(), Json::from(3)).missing(&Json::parse(&file.text)).is_some()
+        );
+        for value in ["-3", "many"] {
+            let error = file.changed(&[Change::new(path.into(), Json::parse(value))]).unwrap_err();
+            assert!(error.problems.iter().all(|problem| problem.path == path), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_path_without_its_beginning_gets_it() {
+        let file = ExperimentFile::read(&quickstart()).unwrap();
+        let error = file.changed(&[Change::new("population_size".into(), Json::from(10))]);
+        let error = error.unwrap_err().to_string();
+        assert!(error.ends_with("; did you mean `algorithm.population_size`?"), "{error}");
     }
 
     #[test]

@@ -175,6 +175,11 @@ fn describe(champion: &Champion) -> String {
 /// Describes a champion's judgement.
 fn describe_judgement(champion: &Champion) -> String {
     match &champion.judged {
+        // A single trial has no interval.
+        Some(judged) if judged.n_trials == 1 => format!(
+            "champion judged: {} on 1 trial that selected nothing",
+            number(judged.mean.get(), 6)
+        ),
         Some(judged) => format!(
             "champion judged: {} (95 %: {} to {}) on {} trials that selected nothing",
             number(judged.mean.get(), 6),
