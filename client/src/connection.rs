@@ -198,6 +198,12 @@ impl Connection {
         }
     }
 
+    /// The data directory, if no program computes its experiments.
+    pub async fn idle_data_dir(&self) -> Option<&Path> {
+        let data_dir = self.data_dir().filter(|_| !self.computes())?;
+        self.holder().await.is_none().then_some(data_dir)
+    }
+
     /// The same connection with another patience.
     pub fn with_patience(&self, patience: Duration) -> Self {
         Self { patience, ..self.clone() }

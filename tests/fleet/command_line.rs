@@ -57,6 +57,8 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
     assert_eq!(interrupted.wait().code(), Some(130));
     let n_done = interrupted.lines().iter().filter(|line| line["generation"].is_u64()).count();
     assert!(n_done < 6, "the interrupt came before the end");
+    let list = swarmctl(["list", "--data-dir", data_dir]).expect_success();
+    assert!(list.stderr.contains("no program computes it; continue it with"), "{}", list.stderr);
 
     let continued = swarmctl(args).expect_success().json_lines();
     let elsewhere = tempfile::tempdir().unwrap();

@@ -5,7 +5,7 @@ mod filter;
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use console::Style;
-use model::wire::state_name;
+use model::wire::{has_ended, state_name};
 use swarm_proto::v1::{Experiment, ListWorkersRequest};
 
 use crate::{
@@ -96,6 +96,11 @@ impl Remote for ListArgs {
         let answer = connection.call_fleet(async |client| client.list_workers(request).await);
         let n_evaluations = answer.await.map_or(0, |answer| answer.evaluations.len());
         text::evaluations(n_evaluations).iter().for_each(|remark| progress.remark(remark));
+        if let Some(data_dir) = connection.idle_data_dir().await
+            && let Some(experiment) = experiments.iter().find(|of| !has_ended(of.state()))
+        {
+            progress.remark(&text::deserted(experiment, data_dir));
+        }
         Ok(())
     }
 }

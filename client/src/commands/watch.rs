@@ -331,15 +331,13 @@ pub async fn ended(
 /// Waits until no program computes the unfinished experiments of a data directory, then returns
 /// an error. Waits for ever with a coordinator, or if this process computes.
 pub async fn deserted(connection: &Connection, experiments: &[Experiment]) -> Error {
-    let Some(data_dir) = connection.data_dir().filter(|_| !connection.computes()) else {
+    if connection.data_dir().is_none() || connection.computes() {
         return pending().await;
-    };
+    }
     let mut looks = interval(LOOK_EVERY);
     loop {
         looks.tick().await;
-        if connection.holder().await.is_some() {
-            continue;
-        }
+        let Some(data_dir) = connection.idle_data_dir().await else { continue };
         for experiment in experiments {
             match connection.experiment(experiment.id).await {
                 Ok(experiment) if has_ended(experiment.state()) => {}
