@@ -15,7 +15,7 @@ use console::measure_text_width;
 use indicatif::{FormattedDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
-use swarm_proto::v1::{Experiment, GenerationSummary};
+use swarm_proto::v1::{Experiment, GenerationSummary, Round};
 use swarm_telemetry::{escape, escape_lines};
 
 use crate::{
@@ -388,6 +388,28 @@ impl Progress {
                 }
                 self.print(&line)
             }
+        }
+    }
+
+    /// The first followed experiment that has not ended.
+    pub fn first_unfinished(&self) -> Option<u64> {
+        self.followed.iter().find(|(_, run)| !run.has_ended).map(|(&id, _)| id)
+    }
+
+    /// Shows how far a long round is: beside the bar, or in occasional lines.
+    pub fn round(&mut self, experiment_id: u64, round: &Round) {
+        let line = text::round(round);
+        if self.has_terminal && !self.is_json() {
+            let label = match self.followed.get(&experiment_id) {
+                Some(run) if self.followed.len() > 1 => run.label.clone(),
+                _ => String::new(),
+            };
+            return self.set_message(&[label, line]);
+        }
+        let now = clock::now();
+        if self.next_word.is_none_or(|(next, _)| now >= next) {
+            self.next_word = Some((now + STEP_PAUSE, 0));
+            self.notice(experiment_id, &line);
         }
     }
 

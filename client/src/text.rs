@@ -5,7 +5,7 @@ use std::path::Path;
 use model::wire::state_name;
 use swarm_proto::v1::{
     Event, Experiment, ExperimentState, ForkOrigin, GenerationSummary, GetChampionResponse,
-    HeldOutFitness, JudgedFitness, event::Kind,
+    HeldOutFitness, JudgedFitness, Round, event::Kind,
 };
 
 use console::truncate_str;
@@ -60,6 +60,18 @@ pub fn evaluations(number: usize) -> Option<String> {
         n => format!("{n} evaluations are not done"),
     };
     Some(format!("{what}; see why: swarmctl explain"))
+}
+
+/// How far a round is, such as "generation 3: 120 of 500 episodes".
+pub fn round(round: &Round) -> String {
+    let generation = round.generation;
+    let what = match round {
+        Round { judgement: true, .. } => "judging the champion".to_owned(),
+        Round { held_out: true, .. } => format!("candidates of generation {generation}"),
+        _ => format!("generation {generation}"),
+    };
+    let n_done = round.episodes.saturating_sub(round.episodes_left);
+    format!("{what}: {n_done} of {} episodes", round.episodes)
 }
 
 /// A count that may be large, to three digits, such as "1.50 billion".

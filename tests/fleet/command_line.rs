@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    io::Write as _,
+    io::{BufRead as _, BufReader, Write as _},
     net::TcpListener,
     process::{Command, Stdio},
     thread,
@@ -66,6 +66,22 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
     let undisturbed = swarmctl(args).expect_success().json_lines();
     assert_eq!(continued.last().unwrap()["digest"], undisturbed.last().unwrap()["digest"]);
     assert_eq!(continued.last().unwrap()["experiment"], 1, "no second experiment was started");
+}
+
+#[test]
+fn a_long_generation_is_not_silent() {
+    let directory = tempfile::tempdir().unwrap();
+    let experiment =
+        Experiment::small(1).edit(|value| value["algorithm"]["evaluation_steps"] = json!(50_000));
+    let mut run = Command::new(harness::binary("swarmctl"));
+    run.arg("run").arg(experiment.path()).args(["--workers", "1", "--data-dir"]);
+    let mut run = run.arg(directory.path()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let is_progress =
+        |line: &String| line.starts_with("generation 0: ") && line.ends_with(" of 36 episodes");
+    assert!(lines.any(|line| is_progress(&line)), "it has ended without a word");
+    run.kill().unwrap();
+    run.wait().unwrap();
 }
 
 #[test]

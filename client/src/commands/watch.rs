@@ -10,12 +10,15 @@ use std::{future::pending, path::Path, sync::Arc, time::Duration};
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use model::wire::has_ended;
-use swarm_proto::v1::{Experiment, ExperimentState, GetChampionResponse};
+use swarm_proto::v1::{
+    Experiment, ExperimentState, ExplainExperimentRequest, ExplainExperimentResponse,
+    GetChampionResponse,
+};
 use swarm_telemetry::parse_duration;
 use tokio::{
     sync::{Semaphore, mpsc},
     task::JoinSet,
-    time::interval,
+    time::{interval, timeout},
 };
 
 use super::{champion_file, compare};
@@ -28,6 +31,7 @@ use crate::{
     remote::Remote,
     subject::Subject,
     text,
+    waiting::SILENCE_MAX,
 };
 
 use self::{
@@ -245,11 +249,24 @@ pub async fn follow(
     followers.spawn(situation::tell(connection.clone(), ids, sender));
     let mut ended = Vec::new();
     let mut last_loss = String::new();
+    let mut is_hindered = false;
     while ended.len() < n_followed {
-        // One of the tasks runs until the last experiment has ended.
-        let Some(news) = news.recv().await else { break };
+        let news = match timeout(SILENCE_MAX, news.recv()).await {
+            Ok(Some(news)) => news,
+            // One of the tasks runs until the last experiment has ended.
+            Ok(None) => break,
+            Err(_) => {
+                if !is_hindered {
+                    show_round(&connection, progress).await;
+                }
+                continue;
+            }
+        };
         match news {
-            News::Situation(id, finding) => progress.situation(id, finding.as_ref()),
+            News::Situation(id, finding) => {
+                is_hindered = finding.is_some();
+                progress.situation(id, finding.as_ref());
+            }
             News::Generation(id, summary) => progress.generation(id, &summary)?,
             News::Notice(id, text) => progress.notice(id, &text),
             // All followers of one coordinator lose it together.
@@ -271,6 +288,19 @@ pub async fn follow(
     progress.clear();
     ended.sort_by_key(|followed| followed.experiment.id);
     Ok(ended)
+}
+
+/// Shows how far the generation in evaluation is. A lost coordinator is the followers' news.
+async fn show_round(connection: &Connection, progress: &mut Progress) {
+    let Some(id) = progress.first_unfinished() else { return };
+    let explaining = connection.with_patience(Duration::ZERO);
+    let request = ExplainExperimentRequest { experiment_id: id };
+    let answer = explaining.call(async |client| client.explain_experiment(request).await);
+    if let Ok(Ok(ExplainExperimentResponse { round: Some(round), .. })) =
+        timeout(SILENCE_MAX, answer).await
+    {
+        progress.round(id, &round);
+    }
 }
 
 async fn final_state(
