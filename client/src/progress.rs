@@ -325,14 +325,14 @@ impl Progress {
             _ => "{prefix} {bar:24} {pos}/{len}  {msg}",
         };
         let style = ProgressStyle::with_template(template).expect("the template is valid");
-        // Shows a removed bar again.
-        if self.bar.is_finished() {
-            self.bar.reset();
-        }
         self.bar.set_style(style);
         self.bar.set_length(length);
         self.bar.set_prefix(name);
         self.bar.set_message(text::cut(message, self.message_room()));
+        // Shows a removed bar again, with its new texts.
+        if self.bar.is_finished() {
+            self.bar.reset();
+        }
         // A new target would draw below the output of the previous one.
         if self.bar.is_hidden() {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
