@@ -163,13 +163,13 @@ impl<W: Work> SimulatedFleet<W> {
 
     fn computed(&mut self, id: WorkerId, assignment: AssignmentId) {
         let now = self.now;
-        let gone =
-            self.workers.get_mut(&id).is_none_or(|worker| worker.dropped.remove(&assignment));
-        if gone {
+        let present = self.workers.get_mut(&id);
+        let wanted =
+            present.and_then(|worker| (!worker.dropped.remove(&assignment)).then_some(worker));
+        let Some(worker) = wanted else {
             self.results.remove(&assignment);
             return;
-        }
-        let worker = self.workers.get_mut(&id).expect("just seen");
+        };
         if worker.stalled_until == Duration::MAX {
             worker.postponed.push(assignment);
             return;
