@@ -159,17 +159,16 @@ mod tests {
         Ok(captured.lines().join("\n"))
     }
 
-    /// The mean fitness of the generations of a run of this file.
-    async fn means(directory: &Path, name: &str, generations: u32) -> Vec<f64> {
+    /// The mean fitness of the generations of a run of this file, with changes.
+    async fn means(directory: &Path, name: &str, changes: &str) -> Vec<f64> {
         let path = directory.join(format!("{name}.json"));
-        // Judging takes most of the time of a short run.
-        let text = fs::read_to_string(&path).unwrap();
-        let text = text.replace("\"judgement_trials\": 100", "\"judgement_trials\": 1");
-        fs::write(&path, text.replace("\"champion_trials\": 20", "\"champion_trials\": 1"))
-            .unwrap();
         let data = directory.join(format!("{name}.data"));
         let at = ["--data-dir", data.to_str().unwrap()];
-        let run = format!("run {} --generations {generations}", path.display());
+        // Judging takes most of the time of a short run.
+        let run = format!(
+            "run {} --set algorithm.judgement_trials=1;algorithm.champion_trials=1;{changes}",
+            path.display()
+        );
         let text = output(&run, &at).await;
         assert!(text.contains("completed after"), "{text}");
         let history = output("history 1 --output json", &at).await;
@@ -195,7 +194,8 @@ mod tests {
             // A generation of the thesis's experiments takes as long as a whole run of other
             // experiments.
             if compiled.config.algorithm.generations <= 120 {
-                assert_eq!(means(directory.path(), &own, 1).await.len(), 1);
+                let changes = "algorithm.population_size=16;algorithm.generations=1";
+                assert_eq!(means(directory.path(), &own, changes).await.len(), 1);
             }
         }
     }
@@ -204,7 +204,7 @@ mod tests {
     async fn the_default_template_improves_in_a_few_generations() {
         let directory = tempfile::tempdir().unwrap();
         written(directory.path(), &["spread"]).unwrap();
-        let means = means(directory.path(), "spread", 8).await;
+        let means = means(directory.path(), "spread", "algorithm.generations=8").await;
         assert!(means[7] > means[0] + 0.05, "{means:?}");
     }
 

@@ -173,7 +173,8 @@ fn peak() -> Option<usize> {
 fn no_bundle_takes_more_memory_than_a_few_times_its_content() {
     if let Some(path) = env::var_os(VARIABLE) {
         let refusal = refusal(&fs::read(path).unwrap());
-        println!("refused: {refusal}\npeak: {}\n", peak().unwrap());
+        // With a single thread, a test's name comes before on the same line.
+        println!("\nrefused: {refusal}\npeak: {}\n", peak().unwrap());
         return;
     }
     if peak().is_none() {
