@@ -3,6 +3,7 @@
 use std::{borrow::Cow, fmt};
 
 use clap::Args;
+use experiment_file::suggestion;
 use indexmap::IndexMap;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
@@ -182,36 +183,13 @@ impl Change {
         for (i, key) in keys[..keys.len() - 1].iter().enumerate() {
             let object = place.object()?;
             let Some(inner) = object.get(*key) else {
-                let known: Vec<String> = object.keys().map(|key| format!("`{key}`")).collect();
+                let known: Vec<&String> = object.keys().collect();
                 let path = keys[..=i].join(".");
-                return Some((path, format!("the file has none; it has {}", known.join(", "))));
+                return Some((path, format!("the file has none; {}", suggestion(key, &known))));
             };
             place = inner;
         }
         None
-    }
-}
-
-impl Change {
-    /// This path, which the file lacks, and the only place of the file whose path ends with it.
-    pub fn elsewhere(&self, file: &Json) -> Option<(String, String)> {
-        let keys: Vec<&str> = self.path.split('.').collect();
-        let mut found = Vec::new();
-        ending_in(&keys, file, String::new(), &mut found);
-        match &found[..] {
-            [place] if *place != self.path => Some((self.path.clone(), place.clone())),
-            _ => None,
-        }
-    }
-}
-
-/// Collects the paths of the places that end with `keys`.
-fn ending_in(keys: &[&str], place: &Json, path: String, found: &mut Vec<String>) {
-    if place.get(keys.iter().copied()).is_some() {
-        found.push(format!("{path}{}", keys.join(".")));
-    }
-    for (key, inner) in place.object().into_iter().flatten() {
-        ending_in(keys, inner, format!("{path}{key}."), found);
     }
 }
 

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use evolution::ALGORITHMS;
 use experiment_file::{
-    ConfigError, ExperimentConfig, Problem, ScriptConfig, inline_script, limits, plain, script_path,
+    ConfigError, ExperimentConfig, Problem, ScriptConfig, explain_key, inline_script, json_schema,
+    limits, plain, script_path,
 };
 use model::limits::KEY_LEN_MAX;
 use sim_core::{Simulation, TRYING_TIME_MAX};
@@ -103,8 +104,6 @@ impl ExperimentFile {
         read(&self.text)?;
         let mut file = Json::parse(&plain(&self.text));
         let missing: Vec<_> = changes.iter().filter_map(|change| change.missing(&file)).collect();
-        let elsewhere: Vec<_> =
-            changes.iter().filter_map(|change| change.elsewhere(&file)).collect();
         apply_all(changes, &mut file).map_err(|problems| ConfigError {
             problems: problems.into_iter().map(unlocated).collect(),
         })?;
@@ -112,6 +111,7 @@ impl ExperimentFile {
         match read(&text).map_err(without_lines) {
             Ok(_) => Ok(Self { path: self.path.clone(), text }),
             Err(mut error) => {
+                let schema = json_schema(ALGORITHMS);
                 let is_set =
                     |path: &str| changes.iter().any(|change| is_within(path, &change.path));
                 for (object, message) in missing {
@@ -123,10 +123,10 @@ impl ExperimentFile {
                         error.problems.push(Problem { path: object, line: None, message });
                     }
                 }
-                for (path, place) in elsewhere {
-                    for problem in error.problems.iter_mut().filter(|problem| problem.path == path)
-                    {
-                        problem.message = format!("{}; did you mean `{place}`?", problem.message);
+                for Change { path, .. } in changes {
+                    let Err(unknown) = explain_key(&schema, path) else { continue };
+                    for problem in error.problems.iter_mut().filter(|of| of.path == *path) {
+                        problem.message = unknown.to_string();
                     }
                 }
                 Err(error)
@@ -373,7 +373,7 @@ pub mod tests {
         let file = ExperimentFile::read(&quickstart()).unwrap();
         let path = "world.objects.robotA.num_instances".into();
         let error = file.changed(&[Change::new(path, Json::from(3))]).unwrap_err();
-        let expected = "world.objects.robotA: the file has none; it has `robot`";
+        let expected = "world.objects.robotA: the file has none; did you mean `robot`?";
         assert_eq!(error.to_string(), expected);
     }
 

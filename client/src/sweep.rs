@@ -4,7 +4,8 @@ use std::{collections::BTreeSet, str::FromStr};
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
-use experiment_file::{ConfigError, ExperimentConfig};
+use experiment_file::{ConfigError, ExperimentConfig, Problem};
+use indexmap::IndexMap;
 use model::group::Membership;
 use sha2::{Digest as _, Sha256};
 use swarm_proto::v1::SubmitExperimentRequest;
@@ -94,14 +95,21 @@ pub fn runs(args: &ExperimentArgs) -> Result<Vec<SweepRun>, Error> {
     };
     let variants = variants(&args.sweep.set.set, RUNS_MAX / seeds.len())?;
     let is_group = args.sweep.group.is_some() || args.sweep.seeds.is_some() || variants.len() > 1;
-    let (mut runs, mut problems) = (Vec::new(), Vec::new());
+    let mut runs = Vec::new();
+    // A problem of several variants is reported once.
+    let mut problems: IndexMap<String, (Problem, Vec<&str>)> = IndexMap::new();
     for variant in &variants {
         let checked = file.changed(&variant.changes).and_then(|file| {
             let config = file.check(&overrides)?.config;
             Ok((file, config))
         });
         match checked {
-            Err(error) => problems.extend(error.problems),
+            Err(error) => {
+                for problem in error.problems {
+                    let same = problems.entry(problem.to_string());
+                    same.or_insert_with(|| (problem, Vec::new())).1.push(&variant.name);
+                }
+            }
             Ok((file, config)) => {
                 for &seed in &seeds {
                     let overrides = Overrides { seed, ..overrides };
@@ -121,12 +129,26 @@ pub fn runs(args: &ExperimentArgs) -> Result<Vec<SweepRun>, Error> {
         return Err(interrupt::error());
     }
     if !problems.is_empty() {
-        let mut seen = BTreeSet::new();
-        // A problem of several variants is reported once.
-        problems.retain(|problem| seen.insert(problem.to_string()));
-        return Err(invalid(ConfigError { problems }));
+        let problems = problems.into_values().map(|(mut problem, names)| {
+            // A problem of a changed value names the value.
+            let mut changes = variants.iter().flat_map(|variant| &variant.changes);
+            let is_of_value = changes.any(|change| change.path == problem.path);
+            if names.len() < variants.len() && !is_of_value {
+                problem.message += &format!(" (with {})", first_few(&names));
+            }
+            problem
+        });
+        return Err(invalid(ConfigError { problems: problems.collect() }));
     }
     Ok(runs)
+}
+
+/// The first names, and the number of further ones.
+fn first_few(names: &[&str]) -> String {
+    match names {
+        [first, _, _, ..] => format!("{first} and {} others", names.len() - 1),
+        few => few.join(" and "),
+    }
 }
 
 /// Turns a request into that of a run of a group: repeating the request returns the

@@ -114,6 +114,10 @@ fn each_mistake_of_all_values_is_reported_once() {
         assert!(report.contains(&problem), "{report}");
     }
 
+    // Five robots find no place on a strip of one centimetre.
+    let report = refusal(&["--set", "world.width=1000,1; world.height=1000"]);
+    assert!(report.ends_with("(with world.width=1)"), "{report}");
+
     let report = refusal(&["--set", "x", "--set", "a=1", "--set", "a=2", "--set", "seed=1,2"]);
     for part in ["`x`: expected PATH=VALUE", "a is given twice", "give --seeds"] {
         assert!(report.contains(part), "{report}");
