@@ -2,7 +2,11 @@
 
 use std::sync::{Arc, Mutex};
 
-use super::*;
+use std::collections::VecDeque;
+
+use swarm_proto::v1::{Experiment, GenerationSummary};
+
+use super::{followed::*, *};
 
 /// Standard output that a test can read.
 #[derive(Debug, Clone, Default)]
