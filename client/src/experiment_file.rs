@@ -1,6 +1,9 @@
 //! Experiment files: reading, checking, compiling, and submitting them.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::LazyLock,
+};
 
 use evolution::ALGORITHMS;
 use experiment_file::{
@@ -20,6 +23,9 @@ use crate::{
     input::{is_stdin, read_text},
     interrupt, json,
 };
+
+/// The schema of experiment files: a sweep may have hundreds of mistakes.
+static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(|| json_schema(ALGORITHMS));
 
 /// The text of an experiment file.
 #[derive(Debug, Clone)]
@@ -111,12 +117,12 @@ impl ExperimentFile {
         match read(&text).map_err(without_lines) {
             Ok(_) => Ok(Self { path: self.path.clone(), text }),
             Err(mut error) => {
-                let schema = json_schema(ALGORITHMS);
                 let is_set =
                     |path: &str| changes.iter().any(|change| is_within(path, &change.path));
                 for (object, message) in missing {
                     let is_of_object = |problem: &Problem| is_within(&problem.path, &object);
-                    let mut problems = error.problems.iter().filter(|of| is_of_object(of));
+                    let mut problems =
+                        error.problems.iter().filter(|problem| is_of_object(problem));
                     // An object that lacks more than was set is a mistake in its name.
                     if problems.any(|problem| !is_set(&problem.path)) {
                         error.problems.retain(|problem| !is_of_object(problem));
@@ -124,8 +130,9 @@ impl ExperimentFile {
                     }
                 }
                 for Change { path, .. } in changes {
-                    let Err(unknown) = explain_key(&schema, path) else { continue };
-                    for problem in error.problems.iter_mut().filter(|of| of.path == *path) {
+                    let Err(unknown) = explain_key(&SCHEMA, path) else { continue };
+                    for problem in error.problems.iter_mut().filter(|problem| problem.path == *path)
+                    {
                         problem.message = unknown.to_string();
                     }
                 }
@@ -375,6 +382,18 @@ pub mod tests {
         let error = file.changed(&[Change::new(path, Json::from(3))]).unwrap_err();
         let expected = "world.objects.robotA: the file has none; did you mean `robot`?";
         assert_eq!(error.to_string(), expected);
+        // Its name begins like that of an object with another mistake.
+        let change = |path: &str, value| Change::new(path.into(), Json::parse(value));
+        let wrong = [
+            change("world.objects.rob.num_instances", "3"),
+            change("world.objects.robot.num_instances", "-3"),
+        ];
+        let error = file.changed(&wrong).unwrap_err().to_string();
+        for part in
+            ["world.objects.rob: the file has none", "world.objects.robot.num_instances: must"]
+        {
+            assert!(error.contains(part), "{error}");
+        }
     }
 
     #[test]

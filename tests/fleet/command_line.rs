@@ -85,6 +85,19 @@ fn a_long_generation_is_not_silent() {
 }
 
 #[test]
+fn a_champion_that_is_judged_once_has_no_interval() {
+    let directory = tempfile::tempdir().unwrap();
+    let experiment =
+        Experiment::tiny(1).edit(|value| value["algorithm"]["judgement_trials"] = json!(1));
+    let path = experiment.path();
+    let args = ["run", path.to_str().unwrap(), "--data-dir", directory.path().to_str().unwrap()];
+    let stderr = swarmctl(args).expect_success().stderr;
+    let judged = stderr.lines().find(|line| line.contains("champion judged: ")).unwrap();
+    assert!(judged.ends_with(" on 1 trial that selected nothing"), "{judged}");
+    assert!(!judged.contains("95 %"), "{judged}");
+}
+
+#[test]
 fn a_run_whose_output_nobody_reads_goes_on_to_its_champion() {
     let experiment = Experiment::tiny(3);
     for is_stderr_closed in [false, true] {

@@ -97,7 +97,8 @@ impl Remote for ListArgs {
         let n_evaluations = answer.await.map_or(0, |answer| answer.evaluations.len());
         text::evaluations(n_evaluations).iter().for_each(|remark| progress.remark(remark));
         if let Some(data_dir) = connection.idle_data_dir().await
-            && let Some(experiment) = experiments.iter().find(|of| !has_ended(of.state()))
+            && let Some(experiment) =
+                experiments.iter().find(|experiment| !has_ended(experiment.state()))
         {
             progress.remark(&text::deserted(experiment, data_dir));
         }

@@ -40,6 +40,16 @@ fn large_numbers_have_three_digits_and_a_unit() {
 }
 
 #[test]
+fn a_round_says_what_it_evaluates() {
+    let evaluation = Round { generation: 3, episodes: 500, episodes_left: 380, ..Round::default() };
+    assert_eq!(round(&evaluation), "generation 3: 120 of 500 episodes");
+    let held_out = Round { held_out: true, ..evaluation.clone() };
+    assert_eq!(round(&held_out), "candidates of generation 3: 120 of 500 episodes");
+    let judgement = Round { judgement: true, ..evaluation };
+    assert_eq!(round(&judgement), "judging the champion: 120 of 500 episodes");
+}
+
+#[test]
 fn a_generation_is_one_line() {
     assert_eq!(
         generation(&summary(11), 40),
