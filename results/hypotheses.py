@@ -5,10 +5,10 @@
     results/hypotheses.py report [--update]
 
 EXPERIMENT is a name in the table below. `report` prints the table of every experiment, or writes it into
-docs/notebook/2026-11-thesis.md. `run` writes history and
-champion of each run to results/hypotheses/EXPERIMENT/VARIANT-SEED.csv and .json, and leaves
-existing runs alone, so you may interrupt it. The variant `as it is` is the unchanged file, whose runs are in
-results/histories. Needs Python 3.9, and for `run` swarmctl in the PATH.
+docs/notebook/2026-11-thesis.md; p is of the exact test of Mann and Whitney against the unchanged file. `run` writes
+history and champion of each run to results/hypotheses/EXPERIMENT/VARIANT-SEED.csv and .json, and leaves existing runs
+alone, so you may interrupt it. The variant `as it is` is the unchanged file, whose runs are in results/histories.
+Needs Python 3.9, and for `run` swarmctl in the PATH.
 """
 
 import argparse
@@ -18,7 +18,7 @@ import statistics
 from pathlib import Path
 
 import algorithms
-from report import LAST, RESULTS, markdown, print_or_update, read_csv, spread
+from report import LAST, RESULTS, chance, markdown, print_or_update, read_csv, spread
 
 PAGE = RESULTS.parent / "docs" / "notebook" / "2026-11-thesis.md"
 SEEDS = [0, 1, 2, 3, 4]
@@ -49,6 +49,7 @@ LONG_RADIO = {
     "topology.stimuli.I1.n": 3,
     "topology.ensembles.OUT_COMM.n": 3,
 }
+SHORT = {"algorithm.generations": 150}
 # For each experiment, a file of configs/original: the changes of each variant.
 VARIANTS = {
     "borderline_ga_program": {
@@ -71,11 +72,14 @@ VARIANTS = {
             "world.objects.light_red.controller.params.angle_step": 0.013
         },
         "the network of the original's file for the GA": GA_NETWORK,
-        "radio of 150 cm, messages of 3": LONG_RADIO,
         "first deviation 0.2": {GA + "sigma_init": 0.2},
-        "wheels from -1 to 1": {"topology.ensembles.OUT_WHEELS.activation": "tanh"},
-        "Table 3.2's decay": {SENSORS + sensor + ".decay_rho": 0.05 for sensor in ("light_sensor", "wireless_receiver")},
-        "Table 3.2's noise": {SENSORS + "light_sensor.noise_variance": 0.1},
+        "radio of 150 cm, messages of 3": {**LONG_RADIO, **SHORT},
+        "wheels from -1 to 1": {"topology.ensembles.OUT_WHEELS.activation": "tanh", **SHORT},
+        "Table 3.2's decay": {
+            **{SENSORS + sensor + ".decay_rho": 0.05 for sensor in ("light_sensor", "wireless_receiver")},
+            **SHORT,
+        },
+        "Table 3.2's noise": {SENSORS + "light_sensor.noise_variance": 0.1, **SHORT},
     },
 }
 AS_IT_IS = "as it is"
@@ -136,18 +140,31 @@ def stem_of(name, variant, seed):
 
 
 def report(name):
-    """The table of an experiment."""
+    """The table of an experiment. Longer runs also have a column of the shorter ones' last generations."""
+    variants = {
+        variant: [run for seed in SEEDS if (run := read(name, variant, seed))]
+        for variant in [AS_IT_IS, *VARIANTS[name]]
+    }
+    ends = sorted({len(means) for runs in variants.values() for means, _ in runs})
+    heads = [f"mean, generations {end - LAST + 1} to {end}" for end in ends] + ["champion"]
+    columns = [lambda means, _, end=end: statistics.mean(means[end - LAST : end]) for end in ends]
+    columns.append(lambda _, champion: champion)
     rows = []
-    for variant in [AS_IT_IS, *VARIANTS[name]]:
-        runs = [run for seed in SEEDS if (run := read(name, variant, seed))]
-        if runs:
-            means, champions = zip(*runs)
-            rows.append([variant, len(runs), spread(means), spread(champions)])
-    return markdown(["variant", "seeds", "mean, last 50", "champion"], rows)
+    for variant, runs in variants.items():
+        row = [variant, len(runs)]
+        for column, end in zip(columns, [*ends, ends[-1]]):
+            # Champions of shorter runs do not compare.
+            if not runs or any(len(means) < end for means, _ in runs):
+                row.append("")
+                continue
+            values, others = ([column(*run) for run in some] for some in (runs, variants[AS_IT_IS]))
+            row.append(spread(values) if variant == AS_IT_IS else f"{spread(values)}, p = {chance(values, others):.3f}")
+        rows.append(row)
+    return markdown(["variant", "seeds", *heads], [row for row in rows if row[1]])
 
 
 def read(name, variant, seed):
-    """Mean fitness of the last generations and the champion's worth; None if it has not run."""
+    """The mean fitness of each generation and the champion's worth; None if it has not run."""
     if variant == AS_IT_IS:
         history = RESULTS / "histories" / f"{name}-{seed}.csv"
         champion = RESULTS / "champions" / f"{name}-{seed}.json"
@@ -157,7 +174,7 @@ def read(name, variant, seed):
     if not champion.exists():
         return None
     means = [float(row["mean"]) for row in read_csv(history)]
-    return statistics.mean(means[-LAST:]), json.loads(champion.read_text())["judged"]["mean"]
+    return means, json.loads(champion.read_text())["judged"]["mean"]
 
 
 if __name__ == "__main__":

@@ -15,11 +15,10 @@ import json
 import statistics
 import sys
 import tempfile
-from itertools import combinations
 from pathlib import Path
 
 from hypotheses import changed
-from report import RESULTS, evaluated, interval, markdown, print_or_update, read_csv, swarmctl
+from report import RESULTS, chance, evaluated, interval, markdown, print_or_update, read_csv, swarmctl
 
 PAGE = RESULTS.parent / "docs" / "robots.md"
 TABLE = RESULTS / "realities.csv"
@@ -132,17 +131,6 @@ def of_champions():
         lines.append([title, *(f"{number(whole, key):.3f}" for key in ("nominal", "mean", "worst_tenth")), drop(whole),
                       "; ".join(causes) or "no key for certain", f"{shares[0]:.0%} to {shares[-1]:.0%}", tau])
     return markdown(head, lines)
-
-
-def chance(a, b):
-    """The two-sided p-value of the Mann-Whitney test, exact without ties."""
-    def wins(first):
-        rest = [value for value in a + b if value not in first]
-        return sum(x > y for x in first for y in rest)
-
-    extreme = lambda first: max(wins(first), len(a) * len(b) - wins(first))
-    splits = [extreme(first) for first in combinations(a + b, len(a))]
-    return sum(split >= extreme(a) for split in splits) / len(splits)
 
 
 def of_evolved():
