@@ -7,6 +7,7 @@ use determinism::simd::Simd;
 
 use super::functions::exp;
 use super::model::{FLOOR, Model, Parameters};
+use super::row::{Mask, Row};
 
 /// Voltage of a spike, mV.
 const PEAK: f32 = 30.0;
@@ -39,24 +40,19 @@ impl Model<9, 3> for AdEx {
     }
 
     #[inline(always)]
-    fn update<S: Simd>(
-        simd: S,
-        [rate, rest, rate_w, a, jump_w, rate_theta, rest_theta, jump_theta, reset]: [S::f32s; 9],
-        [v, w, theta]: [S::f32s; 3],
-        current: S::f32s,
-    ) -> ([S::f32s; 3], S::m32s) {
-        let above = simd.sub_f32s(v, theta);
-        let upswing = exp(simd, simd.mul_f32s(above, simd.splat_f32s(0.5)));
-        let slope = simd.mul_add_f32s(simd.splat_f32s(2.0), upswing, simd.sub_f32s(rest, v));
-        let slope = simd.add_f32s(simd.sub_f32s(slope, w), current);
-        let next = simd.mul_add_f32s(rate, slope, v);
-        let next = simd.max_f32s(next, simd.splat_f32s(FLOOR));
-        let spiked = simd.greater_than_or_equal_f32s(next, simd.splat_f32s(PEAK));
-        let slope_w = simd.mul_add_f32s(a, simd.sub_f32s(v, rest), simd.neg_f32s(w));
-        let w = simd.mul_add_f32s(rate_w, slope_w, w);
-        let w = simd.select_f32s(spiked, simd.add_f32s(w, jump_w), w);
-        let relaxed = simd.mul_add_f32s(rate_theta, simd.sub_f32s(rest_theta, theta), theta);
-        let theta = simd.select_f32s(spiked, simd.add_f32s(theta, jump_theta), relaxed);
-        ([simd.select_f32s(spiked, reset, next), w, theta], spiked)
+    fn update<S: Simd, const W: usize>(
+        [rate, rest, rate_w, a, jump_w, rate_theta, rest_theta, jump_theta, reset]: [Row<S, W>; 9],
+        [v, w, theta]: [Row<S, W>; 3],
+        current: Row<S, W>,
+    ) -> ([Row<S, W>; 3], Mask<S, W>) {
+        let upswing = exp((v - theta) * v.constant(0.5));
+        let slope = v.constant(2.0).mul_add(upswing, rest - v) - w + current;
+        let next = rate.mul_add(slope, v).at_least(FLOOR);
+        let spiked = next.reaches(v.constant(PEAK));
+        let w = rate_w.mul_add(a.mul_add(v - rest, -w), w);
+        let w = spiked.select(w + jump_w, w);
+        let relaxed = rate_theta.mul_add(rest_theta - theta, theta);
+        let theta = spiked.select(theta + jump_theta, relaxed);
+        ([spiked.select(reset, next), w, theta], spiked)
     }
 }

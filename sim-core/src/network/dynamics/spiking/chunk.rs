@@ -10,11 +10,21 @@ use super::encoding::EncoderState;
 use super::model::Model;
 use super::neurons::Neurons;
 use super::receptors::ReceptorState;
+use super::row::Row;
 use crate::lanes::Lanes;
 use determinism::Isa;
 
-/// Vectors per row of a chunk, at most.
-pub(super) const MAX_WIDTH: usize = 2;
+/// Vectors per row of a chunk: as many in step as hide the latency of a model's equations.
+const WIDTHS: [usize; 3] = [4, 2, 1];
+/// Lanes of a chunk, at most: a neuron that spikes in one of them costs all of them.
+const MAX_LANES: usize = 32;
+
+/// Vectors per row of the next chunk, if `n_vectors` are left. With plasticity, the weights of each
+/// lane take most of the memory of a chunk, so that it has one vector.
+pub(super) fn width(n_vectors: usize, isa: Isa, is_plastic: bool) -> usize {
+    let max = if is_plastic { 1 } else { (MAX_LANES / isa.vector_len()).min(n_vectors) };
+    WIDTHS.into_iter().find(|&width| width <= max).unwrap_or(1)
+}
 
 /// The state of a network in some neighbouring vectors of lanes.
 #[derive(Debug)]
@@ -123,7 +133,8 @@ impl Chunk {
             }
             1 => self.step::<M, C, Z, 1, false>(circuit, neurons, inputs, isa),
             2 => self.step::<M, C, Z, 2, false>(circuit, neurons, inputs, isa),
-            width => unreachable!("{width} vectors are more than MAX_WIDTH"),
+            4 => self.step::<M, C, Z, 4, false>(circuit, neurons, inputs, isa),
+            width => unreachable!("{width} is none of WIDTHS"),
         }
     }
 
@@ -310,7 +321,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { neurons, chunk } = self;
-        let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+        let (zero, one) = (Row::splat(simd, 0.0), Row::splat(simd, 1.0));
         let states = rows_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<Z>().0;
         let currents = rows::<S, W>(chunk.current.values());
         let spikes = rows_mut::<S, W>(chunk.spikes.values_mut());
@@ -319,24 +330,21 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
         for (neuron, constants) in neurons.constants.iter().enumerate() {
             let mut splat = [zero; C];
             for (splat, &constant) in splat.iter_mut().zip(constants) {
-                *splat = simd.splat_f32s(constant);
+                *splat = Row::splat(simd, constant);
             }
-            let mut is_active = false;
-            for vector in 0..W {
-                let mut state = [zero; Z];
-                for (value, row) in state.iter_mut().zip(&states[neuron]) {
-                    *value = row[vector];
-                }
-                let (state, spiked) = M::update(simd, splat, state, currents[neuron][vector]);
-                for (row, value) in states[neuron].iter_mut().zip(state) {
-                    row[vector] = value;
-                }
-                let spike = simd.select_f32s(spiked, one, zero);
-                spikes[neuron][vector] = spike;
-                counts[neuron][vector] = simd.add_f32s(counts[neuron][vector], spike);
-                is_active |= simd.first_true_m32s(spiked) < S::F32_LANES;
+            let mut state = [zero; Z];
+            for (value, &vectors) in state.iter_mut().zip(&states[neuron]) {
+                *value = Row { simd, vectors };
             }
-            chunk.active.push_if(is_active, neuron);
+            let current = Row { simd, vectors: currents[neuron] };
+            let (state, spiked) = M::update(splat, state, current);
+            for (row, value) in states[neuron].iter_mut().zip(state) {
+                *row = value.vectors;
+            }
+            let spike = spiked.select(one, zero);
+            spikes[neuron] = spike.vectors;
+            counts[neuron] = (Row { simd, vectors: counts[neuron] } + spike).vectors;
+            chunk.active.push_if(spiked.is_any(), neuron);
         }
     }
 }

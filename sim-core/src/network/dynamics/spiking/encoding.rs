@@ -15,6 +15,7 @@ use super::super::aligned::Aligned;
 use super::functions::exp;
 use super::lif::Lif;
 use super::model::Model;
+use super::row::Row;
 use crate::blueprint::{self, Field};
 use crate::lanes::Lanes;
 use crate::network::{Encoder as Structure, Network, Phenotype};
@@ -132,37 +133,33 @@ impl Encoders {
             let n_per_input = values.len() / inputs.len().max(1);
             for (index, input) in inputs.clone().enumerate() {
                 let row = &stimuli.row(input)[lanes.clone()];
-                let stimulus: &[S::f32s; W] = &S::as_simd_f32s(row).0.as_chunks().0[0];
+                let stimulus = Row { simd, vectors: S::as_simd_f32s(row).0.as_chunks().0[0] };
                 match field {
-                    Field::Identity => values[index] = *stimulus,
+                    Field::Identity => values[index] = stimulus.vectors,
                     Field::Radial { shape, steepness, centres, scale, offset } => {
                         let nodes = &mut values[index * n_per_input..][..n_per_input];
                         for (value, &centre) in nodes.iter_mut().zip(centres) {
-                            for (value, s) in value.iter_mut().zip(stimulus) {
-                                let d = simd.sub_f32s(*s, simd.splat_f32s(centre));
-                                let x = respond(simd, *shape, simd.splat_f32s(*steepness), d);
-                                let scale = simd.splat_f32s(*scale);
-                                *value = simd.mul_add_f32s(scale, x, simd.splat_f32s(*offset));
-                            }
+                            let d = stimulus - Row::splat(simd, centre);
+                            let x = respond(*shape, Row::splat(simd, *steepness), d);
+                            let x = Row::splat(simd, *scale).mul_add(x, Row::splat(simd, *offset));
+                            *value = x.vectors;
                         }
                     }
                     Field::Linear(weights) => {
                         for (value, weights) in
                             values.iter_mut().zip(weights.chunks_exact(inputs.len()))
                         {
-                            let weight = simd.splat_f32s(weights[index]);
-                            for (value, s) in value.iter_mut().zip(stimulus) {
-                                let sum = if index == 0 { simd.splat_f32s(0.0) } else { *value };
-                                *value = simd.mul_add_f32s(weight, *s, sum);
-                            }
+                            let before = Row { simd, vectors: *value };
+                            let sum = if index == 0 { Row::splat(simd, 0.0) } else { before };
+                            let weight = Row::splat(simd, weights[index]);
+                            *value = weight.mul_add(stimulus, sum).vectors;
                         }
                     }
                 }
             }
             let Some([low, high]) = self.limits(*scheme) else { continue };
-            let (low, high) = (simd.splat_f32s(low), simd.splat_f32s(high));
-            for value in values.iter_mut().flatten() {
-                *value = simd.max_f32s(simd.min_f32s(*value, high), low);
+            for value in values.iter_mut() {
+                *value = Row { simd, vectors: *value }.at_most(high).at_least(low).vectors;
             }
         }
     }
@@ -182,45 +179,37 @@ impl Encoders {
         let held: &mut [[S::f32s; W]] =
             S::as_mut_simd_f32s(state.held.values_mut()).0.as_chunks_mut().0;
         let held = held.as_chunks_mut::<N_VARIABLES>().0;
-        let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-        let hazard = simd.splat_f32s(1.0 / *limits::POISSON_RATE.end() as f32);
-        let now = simd.splat_f32s((substep + 1) as f32);
+        let (zero, one) = (Row::splat(simd, 0.0), Row::splat(simd, 1.0));
+        let hazard = Row::splat(simd, 1.0 / *limits::POISSON_RATE.end() as f32);
+        let now = Row::splat(simd, (substep + 1) as f32);
         let mut lif = [zero; 5];
         for (splat, &constant) in lif.iter_mut().zip(&self.lif) {
-            *splat = simd.splat_f32s(constant);
+            *splat = Row::splat(simd, constant);
         }
         for Encoder { scheme, nodes, first_draw, .. } in &self.encoders {
             let first_draw = substep as usize * self.n_drawing + first_draw;
             for (index, node) in nodes.clone().enumerate() {
                 let [first, second] = &mut held[node];
-                for vector in 0..W {
-                    let value = values[node][vector];
-                    let spiked = match scheme {
-                        EncodingScheme::Lif => {
-                            let before = [first[vector], second[vector]];
-                            let (after, spiked) = Lif::update(simd, lif, before, value);
-                            [first[vector], second[vector]] = after;
-                            spiked
-                        }
-                        EncodingScheme::PoissonRate => {
-                            let row = &draws.row(first_draw + index)[lanes.clone()];
-                            let draw = S::as_simd_f32s(row).0[vector];
-                            let share = simd.mul_f32s(value, hazard);
-                            let s = first[vector];
-                            let survival = simd.sub_f32s(s, simd.mul_f32s(share, s));
-                            let spiked = simd.less_than_f32s(draw, simd.sub_f32s(one, survival));
-                            first[vector] = simd.select_f32s(spiked, one, survival);
-                            spiked
-                        }
-                        EncodingScheme::RankOrder => {
-                            let is_over = simd.greater_than_or_equal_f32s(value, now);
-                            let age = simd.sub_f32s(value, now);
-                            let is_early = simd.less_than_f32s(age, one);
-                            simd.and_m32s(is_over, is_early)
-                        }
-                    };
-                    spikes[node][vector] = simd.select_f32s(spiked, one, zero);
-                }
+                let value = Row { simd, vectors: values[node] };
+                let s = Row { simd, vectors: *first };
+                let spiked = match scheme {
+                    EncodingScheme::Lif => {
+                        let waiting = Row { simd, vectors: *second };
+                        let ([v, waiting], spiked) = Lif::update(lif, [s, waiting], value);
+                        (*first, *second) = (v.vectors, waiting.vectors);
+                        spiked
+                    }
+                    EncodingScheme::PoissonRate => {
+                        let row = &draws.row(first_draw + index)[lanes.clone()];
+                        let draw = Row { simd, vectors: S::as_simd_f32s(row).0.as_chunks().0[0] };
+                        let survival = s - value * hazard * s;
+                        let spiked = (one - survival).exceeds(draw);
+                        *first = spiked.select(one, survival).vectors;
+                        spiked
+                    }
+                    EncodingScheme::RankOrder => value.reaches(now).and(one.exceeds(value - now)),
+                };
+                spikes[node] = spiked.select(one, zero).vectors;
             }
         }
     }
@@ -228,16 +217,19 @@ impl Encoders {
 
 /// Value of a radial field at a distance d, for a steepness.
 #[inline(always)]
-fn respond<S: Simd>(simd: S, shape: RadialShape, steepness: S::f32s, d: S::f32s) -> S::f32s {
-    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+fn respond<S: Simd, const W: usize>(
+    shape: RadialShape,
+    steepness: Row<S, W>,
+    d: Row<S, W>,
+) -> Row<S, W> {
     let distance = match shape {
-        RadialShape::Cone => simd.max_f32s(d, simd.neg_f32s(d)),
-        RadialShape::Bell | RadialShape::Parabola => simd.mul_f32s(d, d),
+        RadialShape::Cone => d.max(-d),
+        RadialShape::Bell | RadialShape::Parabola => d * d,
     };
-    let fall = simd.mul_f32s(steepness, distance);
+    let fall = steepness * distance;
     match shape {
-        RadialShape::Bell => exp(simd, simd.neg_f32s(fall)),
-        RadialShape::Cone | RadialShape::Parabola => simd.max_f32s(simd.sub_f32s(one, fall), zero),
+        RadialShape::Bell => exp(-fall),
+        RadialShape::Cone | RadialShape::Parabola => (d.constant(1.0) - fall).at_least(0.0),
     }
 }
 

@@ -7,6 +7,7 @@ use determinism::simd::Simd;
 use super::functions::exp;
 use super::lif::gate;
 use super::model::{FLOOR, Model, Parameters};
+use super::row::{Mask, Row};
 
 /// Voltage of a spike, mV.
 const PEAK: f32 = 30.0;
@@ -25,20 +26,17 @@ impl Model<4, 2> for ExpLif {
     }
 
     #[inline(always)]
-    fn update<S: Simd>(
-        simd: S,
-        [rate, rest, threshold, refractory]: [S::f32s; 4],
-        [v, waiting]: [S::f32s; 2],
-        current: S::f32s,
-    ) -> ([S::f32s; 2], S::m32s) {
-        let (current, waiting) = gate(simd, waiting, current);
-        let upswing = exp(simd, simd.sub_f32s(v, threshold));
-        let slope = simd.mul_add_f32s(simd.splat_f32s(0.3), upswing, simd.sub_f32s(rest, v));
-        let slope = simd.mul_add_f32s(simd.splat_f32s(0.6), current, slope);
-        let v = simd.mul_add_f32s(rate, slope, v);
-        let v = simd.max_f32s(v, simd.splat_f32s(FLOOR));
-        let spiked = simd.greater_than_or_equal_f32s(v, simd.splat_f32s(PEAK));
-        let v = simd.select_f32s(spiked, rest, v);
-        ([v, simd.select_f32s(spiked, refractory, waiting)], spiked)
+    fn update<S: Simd, const W: usize>(
+        [rate, rest, threshold, refractory]: [Row<S, W>; 4],
+        [v, waiting]: [Row<S, W>; 2],
+        current: Row<S, W>,
+    ) -> ([Row<S, W>; 2], Mask<S, W>) {
+        let (current, waiting) = gate(waiting, current);
+        let upswing = exp(v - threshold);
+        let slope = v.constant(0.3).mul_add(upswing, rest - v);
+        let slope = v.constant(0.6).mul_add(current, slope);
+        let v = rate.mul_add(slope, v).at_least(FLOOR);
+        let spiked = v.reaches(v.constant(PEAK));
+        ([spiked.select(rest, v), spiked.select(refractory, waiting)], spiked)
     }
 }

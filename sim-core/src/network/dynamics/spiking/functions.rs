@@ -7,29 +7,36 @@ use std::f32::consts::LOG2_E;
 
 use determinism::simd::Simd;
 
-use crate::exp2::{Exp2, exp2, exp2_parts};
+use super::row::Row;
+use crate::exp2::{Exp2, exp2_parts_of};
 
 /// e^x
 #[inline(always)]
-pub(super) fn exp<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
-    exp2(simd, simd.mul_f32s(x, simd.splat_f32s(LOG2_E)))
+pub(super) fn exp<S: Simd, const W: usize>(x: Row<S, W>) -> Row<S, W> {
+    let (one, [s, q, f]) = (x.constant(1.0), exp2_of(x, LOG2_E));
+    s * q.mul_add(f, one)
 }
 
 /// (e^2x - 1) / (e^2x + 1); near 0 nothing cancels.
 #[inline(always)]
-pub(super) fn tanh<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
-    let y = simd.mul_f32s(x, simd.splat_f32s(2.0 * LOG2_E));
-    let Exp2 { s, q, f } = exp2_parts(simd, y);
-    let above = simd.sub_f32s(s, simd.splat_f32s(1.0));
-    let above = simd.mul_add_f32s(s, simd.mul_f32s(q, f), above);
-    simd.div_f32s(above, simd.add_f32s(above, simd.splat_f32s(2.0)))
+pub(super) fn tanh<S: Simd, const W: usize>(x: Row<S, W>) -> Row<S, W> {
+    let (one, [s, q, f]) = (x.constant(1.0), exp2_of(x, 2.0 * LOG2_E));
+    let above = s.mul_add(q * f, s - one);
+    above / (above + x.constant(2.0))
 }
 
 /// (e^x + e^-x) / 2
 #[inline(always)]
-pub(super) fn cosh<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
-    let sum = simd.add_f32s(exp(simd, x), exp(simd, simd.neg_f32s(x)));
-    simd.mul_f32s(simd.splat_f32s(0.5), sum)
+pub(super) fn cosh<S: Simd, const W: usize>(x: Row<S, W>) -> Row<S, W> {
+    x.constant(0.5) * (exp(x) + exp(-x))
+}
+
+/// s, q and f of [`Exp2`] for 2^(factor x).
+#[inline(always)]
+fn exp2_of<S: Simd, const W: usize>(x: Row<S, W>, factor: f32) -> [Row<S, W>; 3] {
+    let simd = x.simd;
+    let Exp2 { s: [s], q: [q], f: [f] } = exp2_parts_of(simd, &[(x * x.constant(factor)).vectors]);
+    [Row { simd, vectors: s }, Row { simd, vectors: q }, Row { simd, vectors: f }]
 }
 
 #[cfg(test)]
@@ -48,7 +55,8 @@ mod tests {
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
             let lanes = self.0.chunks_exact(S::F32_LANES).flat_map(|x| {
                 let x = S::as_simd_f32s(x).0[0];
-                let all = [exp(simd, x), tanh(simd, x), cosh(simd, x)];
+                let x = Row { simd, vectors: [x] };
+                let all = [exp(x), tanh(x), cosh(x)].map(|row| row.vectors[0]);
                 let all: &[f32] = bytemuck::cast_slice(&all);
                 let lane = |i: usize| [0, 1, 2].map(|function| all[function * S::F32_LANES + i]);
                 (0..S::F32_LANES).map(lane).collect::<Vec<_>>()

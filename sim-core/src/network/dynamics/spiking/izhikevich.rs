@@ -5,6 +5,7 @@
 use determinism::simd::Simd;
 
 use super::model::{Model, Parameters};
+use super::row::{Mask, Row};
 
 /// Voltage of a spike, mV.
 const PEAK: f32 = 30.0;
@@ -25,23 +26,20 @@ impl Model<5, 2> for Izhikevich {
     }
 
     #[inline(always)]
-    fn update<S: Simd>(
-        simd: S,
-        [dt, rate_u, b, c, d]: [S::f32s; 5],
-        [v, u]: [S::f32s; 2],
-        current: S::f32s,
-    ) -> ([S::f32s; 2], S::m32s) {
-        let peak = simd.splat_f32s(PEAK);
-        let spiked_before = simd.greater_than_or_equal_f32s(v, peak);
-        let u = simd.select_f32s(spiked_before, simd.add_f32s(u, d), u);
-        let v = simd.select_f32s(spiked_before, c, v);
-        let quadratic = simd.mul_add_f32s(simd.splat_f32s(0.04), v, simd.splat_f32s(5.0));
-        let slope = simd.mul_add_f32s(quadratic, v, simd.sub_f32s(simd.splat_f32s(140.0), u));
-        let slope = simd.mul_add_f32s(simd.splat_f32s(0.1), current, slope);
-        let next = simd.min_f32s(simd.mul_add_f32s(dt, slope, v), peak);
-        let next = simd.max_f32s(next, simd.splat_f32s(LOWEST));
-        let slope_u = simd.mul_add_f32s(b, v, simd.neg_f32s(u));
-        let u = simd.mul_add_f32s(rate_u, slope_u, u);
-        ([next, u], simd.greater_than_or_equal_f32s(next, peak))
+    fn update<S: Simd, const W: usize>(
+        [dt, rate_u, b, c, d]: [Row<S, W>; 5],
+        [v, u]: [Row<S, W>; 2],
+        current: Row<S, W>,
+    ) -> ([Row<S, W>; 2], Mask<S, W>) {
+        let peak = v.constant(PEAK);
+        let spiked_before = v.reaches(peak);
+        let u = spiked_before.select(u + d, u);
+        let v = spiked_before.select(c, v);
+        let quadratic = v.constant(0.04).mul_add(v, v.constant(5.0));
+        let slope = quadratic.mul_add(v, v.constant(140.0) - u);
+        let slope = v.constant(0.1).mul_add(current, slope);
+        let next = dt.mul_add(slope, v).at_most(PEAK).at_least(LOWEST);
+        let u = rate_u.mul_add(b.mul_add(v, -u), u);
+        ([next, u], next.reaches(peak))
     }
 }

@@ -4,6 +4,7 @@
 use determinism::simd::Simd;
 
 use super::model::{FLOOR, Model, Parameters};
+use super::row::{Mask, Row};
 
 #[derive(Debug)]
 pub(super) struct Lif;
@@ -19,27 +20,25 @@ impl Model<5, 2> for Lif {
     }
 
     #[inline(always)]
-    fn update<S: Simd>(
-        simd: S,
-        [rate, rest, resistance, threshold, refractory]: [S::f32s; 5],
-        [v, waiting]: [S::f32s; 2],
-        current: S::f32s,
-    ) -> ([S::f32s; 2], S::m32s) {
-        let (current, waiting) = gate(simd, waiting, current);
-        let slope = simd.mul_add_f32s(resistance, current, simd.sub_f32s(rest, v));
-        let v = simd.mul_add_f32s(rate, slope, v);
-        let v = simd.max_f32s(v, simd.splat_f32s(FLOOR));
-        let spiked = simd.greater_than_or_equal_f32s(v, threshold);
-        let v = simd.select_f32s(spiked, rest, v);
-        ([v, simd.select_f32s(spiked, refractory, waiting)], spiked)
+    fn update<S: Simd, const W: usize>(
+        [rate, rest, resistance, threshold, refractory]: [Row<S, W>; 5],
+        [v, waiting]: [Row<S, W>; 2],
+        current: Row<S, W>,
+    ) -> ([Row<S, W>; 2], Mask<S, W>) {
+        let (current, waiting) = gate(waiting, current);
+        let slope = resistance.mul_add(current, rest - v);
+        let v = rate.mul_add(slope, v).at_least(FLOOR);
+        let spiked = v.reaches(threshold);
+        ([spiked.select(rest, v), spiked.select(refractory, waiting)], spiked)
     }
 }
 
 /// The effective current of a neuron, and its refractory substeps after this substep.
 #[inline(always)]
-pub(super) fn gate<S: Simd>(simd: S, waiting: S::f32s, current: S::f32s) -> (S::f32s, S::f32s) {
-    let zero = simd.splat_f32s(0.0);
-    let is_refractory = simd.greater_than_f32s(waiting, zero);
-    let left = simd.max_f32s(simd.sub_f32s(waiting, simd.splat_f32s(1.0)), zero);
-    (simd.select_f32s(is_refractory, zero, current), left)
+pub(super) fn gate<S: Simd, const W: usize>(
+    waiting: Row<S, W>,
+    current: Row<S, W>,
+) -> (Row<S, W>, Row<S, W>) {
+    let (zero, one) = (waiting.constant(0.0), waiting.constant(1.0));
+    (waiting.exceeds(zero).select(zero, current), (waiting - one).at_least(0.0))
 }

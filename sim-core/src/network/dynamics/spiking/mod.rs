@@ -20,6 +20,7 @@ mod model;
 mod morris_lecar;
 mod neurons;
 mod receptors;
+mod row;
 mod wiring;
 
 use super::{Dynamics, Inputs, SpikeWindow};
@@ -78,13 +79,13 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Spiking<M, C, Z> {
         let neurons = Neurons::compile(network, phenotype);
         let vector_len = isa.vector_len();
         let n_vectors = n_lanes.div_ceil(vector_len);
-        // With plasticity, the weights of each lane take most of the memory of a chunk.
-        let max_width = if circuit.rule.is_some() { 1 } else { chunk::MAX_WIDTH };
-        let chunks = (0..n_vectors).step_by(max_width).map(|first| {
-            let width = max_width.min(n_vectors - first);
-            Chunk::new(&circuit, &neurons, first * vector_len, width, isa)
-        });
-        let chunks = chunks.collect();
+        let mut chunks = Vec::new();
+        let mut first = 0;
+        while first < n_vectors {
+            let width = chunk::width(n_vectors - first, isa, circuit.rule.is_some());
+            chunks.push(Chunk::new(&circuit, &neurons, first * vector_len, width, isa));
+            first += width;
+        }
         Self { isa, circuit, neurons, chunks }
     }
 }

@@ -1,8 +1,10 @@
-//! The interface of models of spiking neurons: one substep of one neuron in a vector of lanes.
+//! The interface of models of spiking neurons: one substep of one neuron in W vectors of lanes.
 
 use std::fmt;
 
 use determinism::simd::Simd;
+
+use super::row::{Mask, Row};
 
 /// The parameters of one neuron, by name.
 pub(super) type Parameters<'a> = &'a dyn Fn(&str) -> f64;
@@ -22,10 +24,9 @@ pub(super) trait Model<const C: usize, const Z: usize>: fmt::Debug {
 
     /// One explicit Euler step with a synaptic current. Returns the new state, and the lanes with
     /// a spike.
-    fn update<S: Simd>(
-        simd: S,
-        constants: [S::f32s; C],
-        state: [S::f32s; Z],
-        current: S::f32s,
-    ) -> ([S::f32s; Z], S::m32s);
+    fn update<S: Simd, const W: usize>(
+        constants: [Row<S, W>; C],
+        state: [Row<S, W>; Z],
+        current: Row<S, W>,
+    ) -> ([Row<S, W>; Z], Mask<S, W>);
 }

@@ -8,6 +8,7 @@ use determinism::simd::Simd;
 
 use super::functions::{cosh, tanh};
 use super::model::{Model, Parameters};
+use super::row::{Mask, Row};
 
 /// Lowest voltage, mV.
 const LOWEST: f32 = -85.0;
@@ -45,28 +46,23 @@ impl Model<12, 2> for MorrisLecar {
     }
 
     #[inline(always)]
-    fn update<S: Simd>(
-        simd: S,
-        [rate, g_l, e_l, g_k, e_k, g_ca, e_ca, v1, per_v2, v3, per_v4, rate_n]: [S::f32s; 12],
-        [v, n]: [S::f32s; 2],
-        current: S::f32s,
-    ) -> ([S::f32s; 2], S::m32s) {
-        let (half, one) = (simd.splat_f32s(0.5), simd.splat_f32s(1.0));
-        let m = tanh(simd, simd.mul_f32s(simd.sub_f32s(v, v1), per_v2));
-        let m = simd.mul_add_f32s(half, m, half);
-        let x = simd.mul_f32s(simd.sub_f32s(v, v3), per_v4);
-        let n_inf = simd.mul_add_f32s(half, tanh(simd, x), half);
-        let share = simd.mul_f32s(rate_n, cosh(simd, simd.mul_f32s(half, x)));
-        let share = simd.min_f32s(share, one);
+    fn update<S: Simd, const W: usize>(
+        [rate, g_l, e_l, g_k, e_k, g_ca, e_ca, v1, per_v2, v3, per_v4, rate_n]: [Row<S, W>; 12],
+        [v, n]: [Row<S, W>; 2],
+        current: Row<S, W>,
+    ) -> ([Row<S, W>; 2], Mask<S, W>) {
+        let half = v.constant(0.5);
+        let m = half.mul_add(tanh((v - v1) * per_v2), half);
+        let x = (v - v3) * per_v4;
+        let n_inf = half.mul_add(tanh(x), half);
+        let share = (rate_n * cosh(half * x)).at_most(1.0);
 
-        let leak = simd.mul_f32s(g_l, simd.sub_f32s(v, e_l));
-        let potassium = simd.mul_f32s(simd.mul_f32s(g_k, n), simd.sub_f32s(v, e_k));
-        let calcium = simd.mul_f32s(simd.mul_f32s(g_ca, m), simd.sub_f32s(v, e_ca));
-        let out = simd.add_f32s(simd.add_f32s(leak, potassium), calcium);
-        let next = simd.mul_add_f32s(rate, simd.sub_f32s(current, out), v);
-        let next = simd.max_f32s(next, simd.splat_f32s(LOWEST));
-        let next = simd.min_f32s(next, simd.splat_f32s(HIGHEST));
-        let n = simd.mul_add_f32s(share, simd.sub_f32s(n_inf, n), n);
-        ([next, n], simd.greater_than_or_equal_f32s(next, simd.splat_f32s(SPIKE)))
+        let leak = g_l * (v - e_l);
+        let potassium = g_k * n * (v - e_k);
+        let calcium = g_ca * m * (v - e_ca);
+        let out = leak + potassium + calcium;
+        let next = rate.mul_add(current - out, v).at_least(LOWEST).at_most(HIGHEST);
+        let n = share.mul_add(n_inf - n, n);
+        ([next, n], next.reaches(v.constant(SPIKE)))
     }
 }

@@ -15,6 +15,7 @@ use super::super::aligned::Aligned;
 use super::blueprint::links;
 use super::circuit::{Weighted, weight};
 use super::functions::exp;
+use super::row::Row;
 use super::wiring::Wiring;
 use crate::blueprint;
 use crate::network::Phenotype;
@@ -123,7 +124,6 @@ impl Receptors {
         }
         held.clock += 1;
         for (neuron, current) in currents.iter_mut().enumerate() {
-            let v = &states[neuron * n_variables];
             for (receptor, (incoming, (gain, reversal))) in
                 self.incoming.iter().zip(self.drives).enumerate()
             {
@@ -141,21 +141,17 @@ impl Receptors {
                         sum[vector] = simd.mul_add_f32s(weight[vector], s, sum[vector]);
                     }
                 }
-                let gain = simd.splat_f32s(gain);
-                for vector in 0..W {
-                    let mut flow = simd.mul_f32s(gain, sum[vector]);
-                    if let Some(reversal) = reversal {
-                        let force = simd.sub_f32s(simd.splat_f32s(reversal), v[vector]);
-                        flow = simd.mul_f32s(flow, force);
-                    }
-                    if receptor == 2 {
-                        let slope = simd.mul_f32s(simd.splat_f32s(-0.062), v[vector]);
-                        let block =
-                            simd.mul_f32s(simd.splat_f32s(self.magnesium), exp(simd, slope));
-                        flow = simd.div_f32s(flow, simd.add_f32s(one, block));
-                    }
-                    current[vector] = simd.add_f32s(current[vector], flow);
+                let v = Row { simd, vectors: states[neuron * n_variables] };
+                let mut flow = Row::splat(simd, gain) * Row { simd, vectors: sum };
+                if let Some(reversal) = reversal {
+                    flow = flow * (Row::splat(simd, reversal) - v);
                 }
+                if receptor == 2 {
+                    let block = exp(Row::splat(simd, -0.062) * v);
+                    let block = Row::splat(simd, self.magnesium) * block;
+                    flow = flow / (Row::splat(simd, 1.0) + block);
+                }
+                *current = (Row { simd, vectors: *current } + flow).vectors;
             }
         }
     }

@@ -1,0 +1,147 @@
+//! Arithmetic on W vectors of lanes in step: while the processor waits for one vector, it computes
+//! the others. Every operation rounds once.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use determinism::simd::Simd;
+
+/// A number in each lane of W vectors.
+#[derive(Clone, Copy)]
+pub(super) struct Row<S: Simd, const W: usize> {
+    pub simd: S,
+    pub vectors: [S::f32s; W],
+}
+
+/// A truth value in each lane of W vectors.
+#[derive(Clone, Copy)]
+pub(super) struct Mask<S: Simd, const W: usize> {
+    simd: S,
+    vectors: [S::m32s; W],
+}
+
+// The loops are plain because closures would not be inlined into code for an instruction set.
+
+/// A function of two numbers by one instruction.
+macro_rules! binary {
+    ($visibility:vis $method:ident = $instruction:ident) => {
+        #[inline(always)]
+        $visibility fn $method(mut self, other: Self) -> Self {
+            for (a, b) in self.vectors.iter_mut().zip(other.vectors) {
+                *a = self.simd.$instruction(*a, b);
+            }
+            self
+        }
+    };
+}
+
+/// A comparison of two numbers by one instruction.
+macro_rules! comparison {
+    ($method:ident = $instruction:ident) => {
+        #[inline(always)]
+        pub fn $method(self, other: Self) -> Mask<S, W> {
+            let Self { simd, vectors } = self;
+            let mut masks = [simd.$instruction(vectors[0], other.vectors[0]); W];
+            for ((mask, a), b) in masks.iter_mut().zip(vectors).zip(other.vectors) {
+                *mask = simd.$instruction(a, b);
+            }
+            Mask { simd, vectors: masks }
+        }
+    };
+}
+
+/// An operator by one instruction.
+macro_rules! operator {
+    ($trait:ident, $method:ident = $instruction:ident) => {
+        impl<S: Simd, const W: usize> $trait for Row<S, W> {
+            type Output = Self;
+            binary!($method = $instruction);
+        }
+    };
+}
+
+operator!(Add, add = add_f32s);
+operator!(Sub, sub = sub_f32s);
+operator!(Mul, mul = mul_f32s);
+operator!(Div, div = div_f32s);
+
+impl<S: Simd, const W: usize> Neg for Row<S, W> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(mut self) -> Self {
+        for a in &mut self.vectors {
+            *a = self.simd.neg_f32s(*a);
+        }
+        self
+    }
+}
+
+impl<S: Simd, const W: usize> Row<S, W> {
+    /// The same number in each lane.
+    #[inline(always)]
+    pub fn splat(simd: S, number: f32) -> Self {
+        Self { simd, vectors: [simd.splat_f32s(number); W] }
+    }
+
+    /// The same number in each lane of as many vectors.
+    #[inline(always)]
+    pub fn constant(self, number: f32) -> Self {
+        Self::splat(self.simd, number)
+    }
+
+    /// self * factor + term, rounded once.
+    #[inline(always)]
+    pub fn mul_add(mut self, factor: Self, term: Self) -> Self {
+        for ((a, b), c) in self.vectors.iter_mut().zip(factor.vectors).zip(term.vectors) {
+            *a = self.simd.mul_add_f32s(*a, b, c);
+        }
+        self
+    }
+
+    /// self, or the bound where it is less.
+    #[inline(always)]
+    pub fn at_least(self, bound: f32) -> Self {
+        self.max(self.constant(bound))
+    }
+
+    /// self, or the bound where it is greater.
+    #[inline(always)]
+    pub fn at_most(self, bound: f32) -> Self {
+        self.min(self.constant(bound))
+    }
+
+    binary!(pub max = max_f32s);
+    binary!(min = min_f32s);
+    comparison!(reaches = greater_than_or_equal_f32s);
+    comparison!(exceeds = greater_than_f32s);
+}
+
+impl<S: Simd, const W: usize> Mask<S, W> {
+    /// The first number where the mask is true, the second elsewhere.
+    #[inline(always)]
+    pub fn select(self, yes: Row<S, W>, mut no: Row<S, W>) -> Row<S, W> {
+        for ((mask, a), b) in self.vectors.into_iter().zip(yes.vectors).zip(&mut no.vectors) {
+            *b = self.simd.select_f32s(mask, a, *b);
+        }
+        no
+    }
+
+    /// Both.
+    #[inline(always)]
+    pub fn and(mut self, other: Self) -> Self {
+        for (a, b) in self.vectors.iter_mut().zip(other.vectors) {
+            *a = self.simd.and_m32s(*a, b);
+        }
+        self
+    }
+
+    /// Whether any lane is true.
+    #[inline(always)]
+    pub fn is_any(self) -> bool {
+        let mut is_any = false;
+        for mask in self.vectors {
+            is_any |= self.simd.first_true_m32s(mask) < S::F32_LANES;
+        }
+        is_any
+    }
+}
