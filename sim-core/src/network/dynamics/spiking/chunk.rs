@@ -14,16 +14,14 @@ use super::row::Row;
 use crate::lanes::Lanes;
 use determinism::Isa;
 
-/// Vectors per row of a chunk: as many in step as hide the latency of a model's equations.
-const WIDTHS: [usize; 3] = [4, 2, 1];
-/// Lanes of a chunk, at most: a neuron that spikes in one of them costs all of them.
+/// Vectors in step: as many as hide the latency of a model's equations.
+const MAX_WIDTH: usize = 4;
+/// Lanes of a chunk, at most: a neuron that spikes in one of them costs time in all of them.
 const MAX_LANES: usize = 32;
 
-/// Vectors per row of the next chunk, if `n_vectors` are left. With plasticity, the weights of each
-/// lane take most of the memory of a chunk, so that it has one vector.
-pub(super) fn width(n_vectors: usize, isa: Isa, is_plastic: bool) -> usize {
-    let max = if is_plastic { 1 } else { (MAX_LANES / isa.vector_len()).min(n_vectors) };
-    WIDTHS.into_iter().find(|&width| width <= max).unwrap_or(1)
+/// Vectors per row of a chunk, at most. With plasticity, the weights of each lane take most of its memory.
+pub(super) fn max_width(isa: Isa, is_plastic: bool) -> usize {
+    if is_plastic { 1 } else { MAX_WIDTH.min(MAX_LANES / isa.vector_len()) }
 }
 
 /// The state of a network in some neighbouring vectors of lanes.
@@ -133,8 +131,9 @@ impl Chunk {
             }
             1 => self.step::<M, C, Z, 1, false>(circuit, neurons, inputs, isa),
             2 => self.step::<M, C, Z, 2, false>(circuit, neurons, inputs, isa),
+            3 => self.step::<M, C, Z, 3, false>(circuit, neurons, inputs, isa),
             4 => self.step::<M, C, Z, 4, false>(circuit, neurons, inputs, isa),
-            width => unreachable!("{width} is none of WIDTHS"),
+            width => unreachable!("{width} vectors are more than MAX_WIDTH"),
         }
     }
 

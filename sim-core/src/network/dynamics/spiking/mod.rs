@@ -79,13 +79,12 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Spiking<M, C, Z> {
         let neurons = Neurons::compile(network, phenotype);
         let vector_len = isa.vector_len();
         let n_vectors = n_lanes.div_ceil(vector_len);
-        let mut chunks = Vec::new();
-        let mut first = 0;
-        while first < n_vectors {
-            let width = chunk::width(n_vectors - first, isa, circuit.rule.is_some());
-            chunks.push(Chunk::new(&circuit, &neurons, first * vector_len, width, isa));
-            first += width;
-        }
+        let max_width = chunk::max_width(isa, circuit.rule.is_some());
+        let chunks = (0..n_vectors).step_by(max_width).map(|first| {
+            let width = max_width.min(n_vectors - first);
+            Chunk::new(&circuit, &neurons, first * vector_len, width, isa)
+        });
+        let chunks = chunks.collect();
         Self { isa, circuit, neurons, chunks }
     }
 }
