@@ -225,16 +225,16 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
         let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
         let plastic = rows::<S, W>(plastic);
         for (neuron, drive) in drives.iter_mut().enumerate() {
-            let mut sum = [simd.splat_f32s(0.0); W];
+            let mut sum = Row::splat(simd, 0.0);
             let numbers = circuit.afferent.numbers_of(neuron);
             for (&(input, shared), &number) in
                 circuit.afferent.synapses_of(neuron).iter().zip(numbers)
             {
                 let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
                 let stimulus = &stimuli.row(input as usize)[chunk.first_lane..][..n_lanes];
-                accumulate(simd, &mut sum, weight, &rows::<S, W>(stimulus)[0]);
+                sum = weight.mul_add(Row::new(simd, rows::<S, W>(stimulus)[0]), sum);
             }
-            *drive = sum;
+            *drive = sum.vectors;
         }
         let lanes = chunk.first_lane..chunk.first_lane + n_lanes;
         circuit.encoders.perceive::<S, W>(simd, &mut chunk.encoders, stimuli, lanes);
@@ -271,7 +271,9 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Propagate<'_, W, PLASTIC>
             for (&(post, shared), &number) in circuit.outgoing.synapses_of(pre).iter().zip(numbers)
             {
                 let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
-                accumulate(simd, &mut currents[post as usize], weight, &spikes[pre]);
+                let current = &mut currents[post as usize];
+                let spikes = Row::new(simd, spikes[pre]);
+                *current = weight.mul_add(spikes, Row::new(simd, *current)).vectors;
             }
         }
         if let (Some(receptors), Some(held)) = (&circuit.receptors, &mut chunk.receptors) {
@@ -293,16 +295,12 @@ fn encode<S: Simd, const W: usize>(
     let n_neurons = circuit.n_neurons;
     let spikes = &mut rows_mut::<S, W>(chunk.spikes.values_mut())[n_neurons..];
     circuit.encoders.encode::<S, W>(simd, &mut chunk.encoders, draws, lanes, substep, spikes);
-    let none = simd.splat_f32s(0.5);
+    let none = Row::splat(simd, 0.5);
     let counts = &mut rows_mut::<S, W>(chunk.counts.values_mut())[n_neurons..];
     for ((node, spikes), counts) in spikes.iter().enumerate().zip(counts) {
-        let mut is_active = false;
-        for (&spike, count) in spikes.iter().zip(counts) {
-            *count = simd.add_f32s(*count, spike);
-            let spiked = simd.greater_than_f32s(spike, none);
-            is_active |= simd.first_true_m32s(spiked) < S::F32_LANES;
-        }
-        chunk.active.push_if(is_active, n_neurons + node);
+        let spikes = Row::new(simd, *spikes);
+        *counts = (Row::new(simd, *counts) + spikes).vectors;
+        chunk.active.push_if(spikes.exceeds(none).is_any(), n_neurons + node);
     }
 }
 
@@ -333,16 +331,16 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
             }
             let mut state = [zero; Z];
             for (value, &vectors) in state.iter_mut().zip(&states[neuron]) {
-                *value = Row { simd, vectors };
+                *value = Row::new(simd, vectors);
             }
-            let current = Row { simd, vectors: currents[neuron] };
+            let current = Row::new(simd, currents[neuron]);
             let (state, spiked) = M::update(splat, state, current);
             for (row, value) in states[neuron].iter_mut().zip(state) {
                 *row = value.vectors;
             }
             let spike = spiked.select(one, zero);
             spikes[neuron] = spike.vectors;
-            counts[neuron] = (Row { simd, vectors: counts[neuron] } + spike).vectors;
+            counts[neuron] = (Row::new(simd, counts[neuron]) + spike).vectors;
             chunk.active.push_if(spiked.is_any(), neuron);
         }
     }
@@ -361,46 +359,26 @@ impl<const W: usize> WithSimd for Listen<'_, W> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { circuit, chunk, substep } = self;
-        let one = simd.splat_f32s(1.0);
-        let [retention, rise, decay] =
-            [circuit.filter.retention, circuit.filter.rise, circuit.filter.decay]
-                .map(|constant| simd.splat_f32s(constant));
-        let now = simd.splat_f32s(substep as f32);
+        let one = Row::splat(simd, 1.0);
+        let retention = Row::splat(simd, circuit.filter.retention);
+        let (rise, decay) =
+            (Row::splat(simd, circuit.filter.rise), Row::splat(simd, circuit.filter.decay));
+        let now = Row::splat(simd, substep as f32);
         let spikes = rows::<S, W>(chunk.spikes.values());
         let first = rows_mut::<S, W>(chunk.first.values_mut());
         for (&neuron, first) in circuit.timed.iter().zip(first) {
-            for vector in 0..W {
-                let spiked = simd.equal_f32s(spikes[neuron][vector], one);
-                let earliest = simd.min_f32s(first[vector], now);
-                first[vector] = simd.select_f32s(spiked, earliest, first[vector]);
-            }
+            let spiked = Row::new(simd, spikes[neuron]).equals(one);
+            let before = Row::new(simd, *first);
+            *first = spiked.select(before.min(now), before).vectors;
         }
         let filter = rows_mut::<S, W>(chunk.filter.values_mut()).as_chunks_mut::<2>().0;
-        for (&neuron, [x, a]) in circuit.filtered.iter().zip(filter) {
-            for vector in 0..W {
-                let spiked = simd.equal_f32s(spikes[neuron][vector], one);
-                let decayed = simd.mul_f32s(x[vector], retention);
-                x[vector] = simd.select_f32s(spiked, one, decayed);
-                let growth = simd.mul_f32s(rise, x[vector]);
-                let room = simd.sub_f32s(one, a[vector]);
-                let loss = simd.mul_f32s(decay, a[vector]);
-                let change = simd.sub_f32s(simd.mul_f32s(growth, room), loss);
-                a[vector] = simd.add_f32s(a[vector], change);
-            }
+        for (&neuron, filtered) in circuit.filtered.iter().zip(filter) {
+            let spiked = Row::new(simd, spikes[neuron]).equals(one);
+            let (x, a) = (Row::new(simd, filtered[0]), Row::new(simd, filtered[1]));
+            let x = spiked.select(one, x * retention);
+            let a = a + (rise * x * (one - a) - decay * a);
+            *filtered = [x.vectors, a.vectors];
         }
-    }
-}
-
-/// Adds weight * values.
-#[inline(always)]
-fn accumulate<S: Simd, const W: usize>(
-    simd: S,
-    sum: &mut [S::f32s; W],
-    weight: [S::f32s; W],
-    values: &[S::f32s; W],
-) {
-    for vector in 0..W {
-        sum[vector] = simd.mul_add_f32s(weight[vector], values[vector], sum[vector]);
     }
 }
 

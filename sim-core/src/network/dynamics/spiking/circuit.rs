@@ -8,6 +8,7 @@ use determinism::simd::Simd;
 use super::super::learning::Rule;
 use super::encoding::Encoders;
 use super::receptors::Receptors;
+use super::row::Row;
 use super::wiring::{Grouped, Wiring};
 use crate::network::{
     Network, Phenotype,
@@ -134,6 +135,6 @@ pub(super) fn weight<S: Simd, const W: usize, const PLASTIC: bool>(
     shared: f32,
     number: usize,
     plastic: &[[S::f32s; W]],
-) -> [S::f32s; W] {
-    if PLASTIC { plastic[number] } else { [simd.splat_f32s(shared); W] }
+) -> Row<S, W> {
+    if PLASTIC { Row::new(simd, plastic[number]) } else { Row::splat(simd, shared) }
 }

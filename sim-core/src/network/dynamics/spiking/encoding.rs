@@ -133,7 +133,7 @@ impl Encoders {
             let n_per_input = values.len() / inputs.len().max(1);
             for (index, input) in inputs.clone().enumerate() {
                 let row = &stimuli.row(input)[lanes.clone()];
-                let stimulus = Row { simd, vectors: S::as_simd_f32s(row).0.as_chunks().0[0] };
+                let stimulus = Row::new(simd, S::as_simd_f32s(row).0.as_chunks().0[0]);
                 match field {
                     Field::Identity => values[index] = stimulus.vectors,
                     Field::Radial { shape, steepness, centres, scale, offset } => {
@@ -149,7 +149,7 @@ impl Encoders {
                         for (value, weights) in
                             values.iter_mut().zip(weights.chunks_exact(inputs.len()))
                         {
-                            let before = Row { simd, vectors: *value };
+                            let before = Row::new(simd, *value);
                             let sum = if index == 0 { Row::splat(simd, 0.0) } else { before };
                             let weight = Row::splat(simd, weights[index]);
                             *value = weight.mul_add(stimulus, sum).vectors;
@@ -159,7 +159,7 @@ impl Encoders {
             }
             let Some([low, high]) = self.limits(*scheme) else { continue };
             for value in values.iter_mut() {
-                *value = Row { simd, vectors: *value }.at_most(high).at_least(low).vectors;
+                *value = Row::new(simd, *value).at_most(high).at_least(low).vectors;
             }
         }
     }
@@ -190,18 +190,18 @@ impl Encoders {
             let first_draw = substep as usize * self.n_drawing + first_draw;
             for (index, node) in nodes.clone().enumerate() {
                 let [first, second] = &mut held[node];
-                let value = Row { simd, vectors: values[node] };
-                let s = Row { simd, vectors: *first };
+                let value = Row::new(simd, values[node]);
+                let s = Row::new(simd, *first);
                 let spiked = match scheme {
                     EncodingScheme::Lif => {
-                        let waiting = Row { simd, vectors: *second };
+                        let waiting = Row::new(simd, *second);
                         let ([v, waiting], spiked) = Lif::update(lif, [s, waiting], value);
                         (*first, *second) = (v.vectors, waiting.vectors);
                         spiked
                     }
                     EncodingScheme::PoissonRate => {
                         let row = &draws.row(first_draw + index)[lanes.clone()];
-                        let draw = Row { simd, vectors: S::as_simd_f32s(row).0.as_chunks().0[0] };
+                        let draw = Row::new(simd, S::as_simd_f32s(row).0.as_chunks().0[0]);
                         let survival = s - value * hazard * s;
                         let spiked = (one - survival).exceeds(draw);
                         *first = spiked.select(one, survival).vectors;

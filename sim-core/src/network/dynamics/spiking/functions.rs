@@ -36,7 +36,7 @@ pub(super) fn cosh<S: Simd, const W: usize>(x: Row<S, W>) -> Row<S, W> {
 fn exp2_of<S: Simd, const W: usize>(x: Row<S, W>, factor: f32) -> [Row<S, W>; 3] {
     let simd = x.simd;
     let Exp2 { s: [s], q: [q], f: [f] } = exp2_parts_of(simd, &[(x * x.constant(factor)).vectors]);
-    [Row { simd, vectors: s }, Row { simd, vectors: q }, Row { simd, vectors: f }]
+    [Row::new(simd, s), Row::new(simd, q), Row::new(simd, f)]
 }
 
 #[cfg(test)]
@@ -55,7 +55,7 @@ mod tests {
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
             let lanes = self.0.chunks_exact(S::F32_LANES).flat_map(|x| {
                 let x = S::as_simd_f32s(x).0[0];
-                let x = Row { simd, vectors: [x] };
+                let x = Row::new(simd, [x]);
                 let all = [exp(x), tanh(x), cosh(x)].map(|row| row.vectors[0]);
                 let all: &[f32] = bytemuck::cast_slice(&all);
                 let lane = |i: usize| [0, 1, 2].map(|function| all[function * S::F32_LANES + i]);

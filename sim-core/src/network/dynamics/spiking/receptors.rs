@@ -102,25 +102,19 @@ impl Receptors {
         let open: &mut [[S::f32s; W]] =
             S::as_mut_simd_f32s(held.open.values_mut()).0.as_chunks_mut().0;
         let open = open.as_chunks_mut::<N_VARIABLES>().0;
-        let one = simd.splat_f32s(1.0);
-        let [left_ampa, left_gaba, left_x] = self.retention.map(|left| simd.splat_f32s(left));
-        let (rise, decay) = (simd.splat_f32s(self.rise), simd.splat_f32s(self.decay));
+        let one = Row::splat(simd, 1.0);
+        let [left_ampa, left_gaba, left_x] = self.retention;
+        let (rise, decay) = (Row::splat(simd, self.rise), Row::splat(simd, self.decay));
         for (axon, [ampa, gaba, x, nmda]) in open.iter_mut().enumerate() {
             // A delay of 1 equals the delay of a static synapse.
-            let arrived = &history[slot(self.delays[axon] - 1) + axon];
-            for vector in 0..W {
-                let spiked = simd.equal_f32s(arrived[vector], one);
-                let closed = simd.mul_f32s(ampa[vector], left_ampa);
-                ampa[vector] = simd.select_f32s(spiked, one, closed);
-                let closed = simd.mul_f32s(gaba[vector], left_gaba);
-                gaba[vector] = simd.select_f32s(spiked, one, closed);
-                let closed = simd.mul_f32s(x[vector], left_x);
-                x[vector] = simd.select_f32s(spiked, one, closed);
-                let room = simd.sub_f32s(one, nmda[vector]);
-                let growth = simd.mul_f32s(simd.mul_f32s(rise, x[vector]), room);
-                let loss = simd.mul_f32s(decay, nmda[vector]);
-                nmda[vector] = simd.add_f32s(nmda[vector], simd.sub_f32s(growth, loss));
+            let arrived = Row::new(simd, history[slot(self.delays[axon] - 1) + axon]);
+            let spiked = arrived.equals(one);
+            for (variable, left) in [(ampa, left_ampa), (gaba, left_gaba), (&mut *x, left_x)] {
+                let closed = Row::new(simd, *variable) * Row::splat(simd, left);
+                *variable = spiked.select(one, closed).vectors;
             }
+            let (x, s) = (Row::new(simd, *x), Row::new(simd, *nmda));
+            *nmda = (s + (rise * x * (one - s) - decay * s)).vectors;
         }
         held.clock += 1;
         for (neuron, current) in currents.iter_mut().enumerate() {
@@ -133,25 +127,22 @@ impl Receptors {
                 }
                 // s_ampa, s_gaba, s_nmda: x is between the last two.
                 let variable = receptor + usize::from(receptor == 2);
-                let mut sum = [simd.splat_f32s(0.0); W];
+                let mut sum = Row::splat(simd, 0.0);
                 for (&(pre, shared), &number) in synapses.iter().zip(incoming.numbers_of(neuron)) {
                     let weight = weight::<S, W, PLASTIC>(simd, shared, number, weights);
-                    for vector in 0..W {
-                        let s = open[pre as usize][variable][vector];
-                        sum[vector] = simd.mul_add_f32s(weight[vector], s, sum[vector]);
-                    }
+                    sum = weight.mul_add(Row::new(simd, open[pre as usize][variable]), sum);
                 }
-                let v = Row { simd, vectors: states[neuron * n_variables] };
-                let mut flow = Row::splat(simd, gain) * Row { simd, vectors: sum };
+                let v = Row::new(simd, states[neuron * n_variables]);
+                let mut flow = Row::splat(simd, gain) * sum;
                 if let Some(reversal) = reversal {
                     flow = flow * (Row::splat(simd, reversal) - v);
                 }
                 if receptor == 2 {
                     let block = exp(Row::splat(simd, -0.062) * v);
                     let block = Row::splat(simd, self.magnesium) * block;
-                    flow = flow / (Row::splat(simd, 1.0) + block);
+                    flow = flow / (one + block);
                 }
-                *current = (Row { simd, vectors: *current } + flow).vectors;
+                *current = (Row::new(simd, *current) + flow).vectors;
             }
         }
     }

@@ -77,6 +77,12 @@ impl<S: Simd, const W: usize> Neg for Row<S, W> {
 }
 
 impl<S: Simd, const W: usize> Row<S, W> {
+    /// These vectors.
+    #[inline(always)]
+    pub fn new(simd: S, vectors: [S::f32s; W]) -> Self {
+        Self { simd, vectors }
+    }
+
     /// The same number in each lane.
     #[inline(always)]
     pub fn splat(simd: S, number: f32) -> Self {
@@ -111,9 +117,10 @@ impl<S: Simd, const W: usize> Row<S, W> {
     }
 
     binary!(pub max = max_f32s);
-    binary!(min = min_f32s);
+    binary!(pub min = min_f32s);
     comparison!(reaches = greater_than_or_equal_f32s);
     comparison!(exceeds = greater_than_f32s);
+    comparison!(equals = equal_f32s);
 }
 
 impl<S: Simd, const W: usize> Mask<S, W> {
