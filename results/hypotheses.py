@@ -146,21 +146,21 @@ def report(name):
         for variant in [AS_IT_IS, *VARIANTS[name]]
     }
     ends = sorted({len(means) for runs in variants.values() for means, _ in runs})
-    heads = [f"mean, generations {end - LAST + 1} to {end}" for end in ends] + ["champion"]
-    columns = [lambda means, _, end=end: statistics.mean(means[end - LAST : end]) for end in ends]
-    columns.append(lambda _, champion: champion)
+    # Of each column: its head, the generations that a run must have, and its figure of a run.
+    last = lambda end: lambda means, _: statistics.mean(means[end - LAST : end])
+    columns = [(f"mean, generations {end - LAST} to {end - 1}", end, last(end)) for end in ends]
+    columns.append(("champion", ends[-1], lambda _, champion: champion))
     rows = []
     for variant, runs in variants.items():
-        row = [variant, len(runs)]
-        for column, end in zip(columns, [*ends, ends[-1]]):
-            # Champions of shorter runs do not compare.
-            if not runs or any(len(means) < end for means, _ in runs):
-                row.append("")
-                continue
-            values, others = ([column(*run) for run in some] for some in (runs, variants[AS_IT_IS]))
-            row.append(spread(values) if variant == AS_IT_IS else f"{spread(values)}, p = {chance(values, others):.3f}")
-        rows.append(row)
-    return markdown(["variant", "seeds", *heads], [row for row in rows if row[1]])
+        cells = []
+        for _, end, figure in columns:
+            values, unchanged = (
+                [figure(*run) for run in some if len(run[0]) >= end] for some in (runs, variants[AS_IT_IS])
+            )
+            p = f", p = {chance(values, unchanged):.3f}" if variant != AS_IT_IS and values and unchanged else ""
+            cells.append(f"{spread(values)}{p}" if values else "")
+        rows.append([variant, len(runs), *cells])
+    return markdown(["variant", "seeds", *(head for head, _, _ in columns)], [row for row in rows if row[1]])
 
 
 def read(name, variant, seed):

@@ -64,14 +64,16 @@ def middle(estimates):
 
 
 def chance(a, b):
-    """The two-sided p-value of the Mann-Whitney test, exact without ties."""
-    def wins(first):
-        rest = [value for value in a + b if value not in first]
-        return sum(x > y for x in first for y in rest)
+    """The two-sided p-value of the exact test of Mann and Whitney; a tie is half a win."""
+    values = a + b
 
-    extreme = lambda first: max(wins(first), len(a) * len(b) - wins(first))
-    splits = [extreme(first) for first in combinations(a + b, len(a))]
-    return sum(split >= extreme(a) for split in splits) / len(splits)
+    def extreme(first):
+        rest = set(range(len(values))) - set(first)
+        wins = sum((values[i] > values[j]) + (values[i] == values[j]) / 2 for i in first for j in rest)
+        return max(wins, len(a) * len(b) - wins)
+
+    splits = [extreme(first) for first in combinations(range(len(values)), len(a))]
+    return sum(split >= extreme(range(len(a))) for split in splits) / len(splits)
 
 
 def read_csv(path):

@@ -24,17 +24,10 @@ pub(crate) struct Exp2<V> {
     pub f: V,
 }
 
-/// 2^y in parts, from which other functions than 2^y can be computed without loss.
+/// 2^y in parts, from which other functions than 2^y can be computed without loss. Several vectors
+/// are in step: while a processor waits for one polynomial, it computes the others.
 #[inline(always)]
-pub(crate) fn exp2_parts<S: Simd>(simd: S, y: S::f32s) -> Exp2<S::f32s> {
-    let Exp2 { s: [[s]], q: [[q]], f: [[f]] } = exp2_parts_of(simd, &[[y]]);
-    Exp2 { s, q, f }
-}
-
-/// [`exp2_parts`] of several vectors in step: while a processor waits for one polynomial, it
-/// computes the others.
-#[inline(always)]
-pub(crate) fn exp2_parts_of<S: Simd, const W: usize, const N: usize>(
+pub(crate) fn exp2_parts<S: Simd, const W: usize, const N: usize>(
     simd: S,
     y: &[[S::f32s; W]; N],
 ) -> Exp2<[[S::f32s; W]; N]> {
@@ -67,6 +60,6 @@ pub(crate) fn exp2_parts_of<S: Simd, const W: usize, const N: usize>(
 /// 2^y.
 #[inline(always)]
 pub(crate) fn exp2<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
-    let Exp2 { s, q, f } = exp2_parts(simd, y);
+    let Exp2 { s: [[s]], q: [[q]], f: [[f]] } = exp2_parts(simd, &[[y]]);
     simd.mul_f32s(s, simd.mul_add_f32s(q, f, simd.splat_f32s(1.0)))
 }

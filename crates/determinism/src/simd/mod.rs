@@ -100,8 +100,6 @@ operations! {
     fn sqrt_f32s(a: Self::f32s) -> Self::f32s;
     /// a = b
     fn equal_f32s(a: Self::f32s, b: Self::f32s) -> Self::m32s;
-    /// a < b
-    fn less_than_f32s(a: Self::f32s, b: Self::f32s) -> Self::m32s;
     /// a <= b
     fn less_than_or_equal_f32s(a: Self::f32s, b: Self::f32s) -> Self::m32s;
     /// a > b

@@ -72,10 +72,6 @@ impl Simd for Portable {
         vector::equal(cast(a), cast(b))
     }
     #[inline(always)]
-    fn less_than_f32s(self, a: Self::f32s, b: Self::f32s) -> Self::m32s {
-        vector::less(cast(a), cast(b))
-    }
-    #[inline(always)]
     fn less_than_or_equal_f32s(self, a: Self::f32s, b: Self::f32s) -> Self::m32s {
         vector::less_or_equal(cast(a), cast(b))
     }

@@ -12,7 +12,7 @@ use std::f64::consts::LOG2_E;
 
 use determinism::simd::Simd;
 
-use crate::exp2::{Exp2, exp2_parts_of};
+use crate::exp2::{Exp2, exp2_parts};
 use experiment_file::Activation;
 
 /// y for an argument of 1.
@@ -117,7 +117,7 @@ fn one_plus_exp2<S: Simd, const W: usize, const N: usize>(
     y: &[[S::f32s; W]; N],
 ) -> [[S::f32s; W]; N] {
     let one = simd.splat_f32s(1.0);
-    let Exp2 { s, mut q, f } = exp2_parts_of(simd, y);
+    let Exp2 { s, mut q, f } = exp2_parts(simd, y);
     for (q, f) in q.iter_mut().zip(f) {
         for vector in 0..W {
             q[vector] = simd.mul_add_f32s(q[vector], f[vector], one);
@@ -153,7 +153,7 @@ fn exp2_minus_one<S: Simd, const W: usize, const N: usize>(
     y: &[[S::f32s; W]; N],
 ) -> [[S::f32s; W]; N] {
     let one = simd.splat_f32s(1.0);
-    let Exp2 { s, mut q, f } = exp2_parts_of(simd, y);
+    let Exp2 { s, mut q, f } = exp2_parts(simd, y);
     for (q, (s, f)) in q.iter_mut().zip(s.iter().zip(f)) {
         for vector in 0..W {
             let above = simd.sub_f32s(s[vector], one);

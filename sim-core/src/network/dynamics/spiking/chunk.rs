@@ -14,12 +14,13 @@ use super::row::Row;
 use crate::lanes::Lanes;
 use determinism::Isa;
 
-/// Vectors in step: as many as hide the latency of a model's equations.
+/// Vectors in step, at most: enough to hide the latency of a model's equations.
 const MAX_WIDTH: usize = 4;
 /// Lanes of a chunk, at most: a neuron that spikes in one of them costs time in all of them.
 const MAX_LANES: usize = 32;
 
-/// Vectors per row of a chunk, at most. With plasticity, the weights of each lane take most of its memory.
+/// Vectors per row of a chunk, at most. With plasticity, the weights of each lane take most of its
+/// memory, so it has one.
 pub(super) fn max_width(isa: Isa, is_plastic: bool) -> usize {
     if is_plastic { 1 } else { MAX_WIDTH.min(MAX_LANES / isa.vector_len()) }
 }
@@ -221,9 +222,9 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
             let rewards = &rewards.row(0)[chunk.first_lane..][..n_lanes];
             rule.learn::<S, W>(simd, memory, rewards);
         }
-        let drives = rows_mut::<S, W>(chunk.drive.values_mut());
+        let drives = vectors_mut::<S, W>(chunk.drive.values_mut());
         let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
-        let plastic = rows::<S, W>(plastic);
+        let plastic = vectors::<S, W>(plastic);
         for (neuron, drive) in drives.iter_mut().enumerate() {
             let mut sum = Row::splat(simd, 0.0);
             let numbers = circuit.afferent.numbers_of(neuron);
@@ -232,7 +233,7 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
             {
                 let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
                 let stimulus = &stimuli.row(input as usize)[chunk.first_lane..][..n_lanes];
-                sum = weight.mul_add(Row::new(simd, rows::<S, W>(stimulus)[0]), sum);
+                sum = weight.mul_add(Row::new(simd, vectors::<S, W>(stimulus)[0]), sum);
             }
             *drive = sum.vectors;
         }
@@ -262,10 +263,10 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Propagate<'_, W, PLASTIC>
             encode::<S, W>(simd, circuit, chunk, draws, substep);
         }
         chunk.current.values_mut().copy_from_slice(chunk.drive.values());
-        let currents = rows_mut::<S, W>(chunk.current.values_mut());
-        let spikes = rows::<S, W>(chunk.spikes.values());
+        let currents = vectors_mut::<S, W>(chunk.current.values_mut());
+        let spikes = vectors::<S, W>(chunk.spikes.values());
         let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
-        let plastic = rows::<S, W>(plastic);
+        let plastic = vectors::<S, W>(plastic);
         for &pre in &chunk.active.sources[..chunk.active.n] {
             let numbers = circuit.outgoing.numbers_of(pre);
             for (&(post, shared), &number) in circuit.outgoing.synapses_of(pre).iter().zip(numbers)
@@ -277,7 +278,7 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Propagate<'_, W, PLASTIC>
             }
         }
         if let (Some(receptors), Some(held)) = (&circuit.receptors, &mut chunk.receptors) {
-            let states = (rows::<S, W>(chunk.state.values()), chunk.n_variables);
+            let states = (vectors::<S, W>(chunk.state.values()), chunk.n_variables);
             receptors.propagate::<S, W, PLASTIC>(simd, plastic, held, spikes, states, currents);
         }
     }
@@ -293,10 +294,10 @@ fn encode<S: Simd, const W: usize>(
 ) {
     let lanes = chunk.first_lane..chunk.first_lane + W * S::F32_LANES;
     let n_neurons = circuit.n_neurons;
-    let spikes = &mut rows_mut::<S, W>(chunk.spikes.values_mut())[n_neurons..];
+    let spikes = &mut vectors_mut::<S, W>(chunk.spikes.values_mut())[n_neurons..];
     circuit.encoders.encode::<S, W>(simd, &mut chunk.encoders, draws, lanes, substep, spikes);
     let none = Row::splat(simd, 0.5);
-    let counts = &mut rows_mut::<S, W>(chunk.counts.values_mut())[n_neurons..];
+    let counts = &mut vectors_mut::<S, W>(chunk.counts.values_mut())[n_neurons..];
     for ((node, spikes), counts) in spikes.iter().enumerate().zip(counts) {
         let spikes = Row::new(simd, *spikes);
         *counts = (Row::new(simd, *counts) + spikes).vectors;
@@ -319,10 +320,10 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { neurons, chunk } = self;
         let (zero, one) = (Row::splat(simd, 0.0), Row::splat(simd, 1.0));
-        let states = rows_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<Z>().0;
-        let currents = rows::<S, W>(chunk.current.values());
-        let spikes = rows_mut::<S, W>(chunk.spikes.values_mut());
-        let counts = rows_mut::<S, W>(chunk.counts.values_mut());
+        let states = vectors_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<Z>().0;
+        let currents = vectors::<S, W>(chunk.current.values());
+        let spikes = vectors_mut::<S, W>(chunk.spikes.values_mut());
+        let counts = vectors_mut::<S, W>(chunk.counts.values_mut());
         chunk.active.n = 0;
         for (neuron, constants) in neurons.constants.iter().enumerate() {
             let mut splat = [zero; C];
@@ -335,8 +336,8 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
             }
             let current = Row::new(simd, currents[neuron]);
             let (state, spiked) = M::update(splat, state, current);
-            for (row, value) in states[neuron].iter_mut().zip(state) {
-                *row = value.vectors;
+            for (vectors, value) in states[neuron].iter_mut().zip(state) {
+                *vectors = value.vectors;
             }
             let spike = spiked.select(one, zero);
             spikes[neuron] = spike.vectors;
@@ -364,14 +365,14 @@ impl<const W: usize> WithSimd for Listen<'_, W> {
         let (rise, decay) =
             (Row::splat(simd, circuit.filter.rise), Row::splat(simd, circuit.filter.decay));
         let now = Row::splat(simd, substep as f32);
-        let spikes = rows::<S, W>(chunk.spikes.values());
-        let first = rows_mut::<S, W>(chunk.first.values_mut());
+        let spikes = vectors::<S, W>(chunk.spikes.values());
+        let first = vectors_mut::<S, W>(chunk.first.values_mut());
         for (&neuron, first) in circuit.timed.iter().zip(first) {
             let spiked = Row::new(simd, spikes[neuron]).equals(one);
             let before = Row::new(simd, *first);
             *first = spiked.select(before.min(now), before).vectors;
         }
-        let filter = rows_mut::<S, W>(chunk.filter.values_mut()).as_chunks_mut::<2>().0;
+        let filter = vectors_mut::<S, W>(chunk.filter.values_mut()).as_chunks_mut::<2>().0;
         for (&neuron, filtered) in circuit.filtered.iter().zip(filter) {
             let spiked = Row::new(simd, spikes[neuron]).equals(one);
             let (x, a) = (Row::new(simd, filtered[0]), Row::new(simd, filtered[1]));
@@ -384,12 +385,12 @@ impl<const W: usize> WithSimd for Listen<'_, W> {
 
 /// Values as rows of W vectors.
 #[inline(always)]
-fn rows<S: Simd, const W: usize>(values: &[f32]) -> &[[S::f32s; W]] {
+fn vectors<S: Simd, const W: usize>(values: &[f32]) -> &[[S::f32s; W]] {
     S::as_simd_f32s(values).0.as_chunks().0
 }
 
 /// Values as rows of W vectors.
 #[inline(always)]
-fn rows_mut<S: Simd, const W: usize>(values: &mut [f32]) -> &mut [[S::f32s; W]] {
+fn vectors_mut<S: Simd, const W: usize>(values: &mut [f32]) -> &mut [[S::f32s; W]] {
     S::as_mut_simd_f32s(values).0.as_chunks_mut().0
 }

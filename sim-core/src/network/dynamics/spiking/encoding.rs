@@ -191,18 +191,18 @@ impl Encoders {
             for (index, node) in nodes.clone().enumerate() {
                 let [first, second] = &mut held[node];
                 let value = Row::new(simd, values[node]);
-                let s = Row::new(simd, *first);
+                let before = Row::new(simd, *first);
                 let spiked = match scheme {
                     EncodingScheme::Lif => {
                         let waiting = Row::new(simd, *second);
-                        let ([v, waiting], spiked) = Lif::update(lif, [s, waiting], value);
+                        let ([v, waiting], spiked) = Lif::update(lif, [before, waiting], value);
                         (*first, *second) = (v.vectors, waiting.vectors);
                         spiked
                     }
                     EncodingScheme::PoissonRate => {
                         let row = &draws.row(first_draw + index)[lanes.clone()];
                         let draw = Row::new(simd, S::as_simd_f32s(row).0.as_chunks().0[0]);
-                        let survival = s - value * hazard * s;
+                        let survival = before - value * hazard * before;
                         let spiked = (one - survival).exceeds(draw);
                         *first = spiked.select(one, survival).vectors;
                         spiked

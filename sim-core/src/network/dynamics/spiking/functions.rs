@@ -8,7 +8,7 @@ use std::f32::consts::LOG2_E;
 use determinism::simd::Simd;
 
 use super::row::Row;
-use crate::exp2::{Exp2, exp2_parts_of};
+use crate::exp2::{Exp2, exp2_parts};
 
 /// e^x
 #[inline(always)]
@@ -35,7 +35,7 @@ pub(super) fn cosh<S: Simd, const W: usize>(x: Row<S, W>) -> Row<S, W> {
 #[inline(always)]
 fn exp2_of<S: Simd, const W: usize>(x: Row<S, W>, factor: f32) -> [Row<S, W>; 3] {
     let simd = x.simd;
-    let Exp2 { s: [s], q: [q], f: [f] } = exp2_parts_of(simd, &[(x * x.constant(factor)).vectors]);
+    let Exp2 { s: [s], q: [q], f: [f] } = exp2_parts(simd, &[(x * x.constant(factor)).vectors]);
     [Row::new(simd, s), Row::new(simd, q), Row::new(simd, f)]
 }
 

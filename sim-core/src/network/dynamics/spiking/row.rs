@@ -1,5 +1,5 @@
 //! Arithmetic on W vectors of lanes in step: while the processor waits for one vector, it computes
-//! the others. Every operation rounds once.
+//! the others. Operators never fuse; only `mul_add` does.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -8,7 +8,9 @@ use determinism::simd::Simd;
 /// A number in each lane of W vectors.
 #[derive(Clone, Copy)]
 pub(super) struct Row<S: Simd, const W: usize> {
+    /// The instructions.
     pub simd: S,
+    /// The numbers.
     pub vectors: [S::f32s; W],
 }
 
@@ -23,7 +25,8 @@ pub(super) struct Mask<S: Simd, const W: usize> {
 
 /// A function of two numbers by one instruction.
 macro_rules! binary {
-    ($visibility:vis $method:ident = $instruction:ident) => {
+    ($(#[$attribute:meta])* $visibility:vis $method:ident = $instruction:ident) => {
+        $(#[$attribute])*
         #[inline(always)]
         $visibility fn $method(mut self, other: Self) -> Self {
             for (a, b) in self.vectors.iter_mut().zip(other.vectors) {
@@ -34,12 +37,14 @@ macro_rules! binary {
     };
 }
 
-/// A comparison of two numbers by one instruction.
+/// A comparison of two numbers by one instruction. NaN compares as false.
 macro_rules! comparison {
-    ($method:ident = $instruction:ident) => {
+    ($(#[$attribute:meta])* $method:ident = $instruction:ident) => {
+        $(#[$attribute])*
         #[inline(always)]
         pub fn $method(self, other: Self) -> Mask<S, W> {
             let Self { simd, vectors } = self;
+            // A mask has no default, so the first one fills the array.
             let mut masks = [simd.$instruction(vectors[0], other.vectors[0]); W];
             for ((mask, a), b) in masks.iter_mut().zip(vectors).zip(other.vectors) {
                 *mask = simd.$instruction(a, b);
@@ -83,13 +88,13 @@ impl<S: Simd, const W: usize> Row<S, W> {
         Self { simd, vectors }
     }
 
-    /// The same number in each lane.
+    /// A number in each lane of W vectors.
     #[inline(always)]
     pub fn splat(simd: S, number: f32) -> Self {
         Self { simd, vectors: [simd.splat_f32s(number); W] }
     }
 
-    /// The same number in each lane of as many vectors.
+    /// Another number, in each lane of as many vectors as self has.
     #[inline(always)]
     pub fn constant(self, number: f32) -> Self {
         Self::splat(self.simd, number)
@@ -104,23 +109,38 @@ impl<S: Simd, const W: usize> Row<S, W> {
         self
     }
 
-    /// self, or the bound where it is less.
+    /// The greater of self and the bound; the bound where self is NaN.
     #[inline(always)]
     pub fn at_least(self, bound: f32) -> Self {
         self.max(self.constant(bound))
     }
 
-    /// self, or the bound where it is greater.
+    /// The smaller of self and the bound; the bound where self is NaN.
     #[inline(always)]
     pub fn at_most(self, bound: f32) -> Self {
         self.min(self.constant(bound))
     }
 
-    binary!(pub max = max_f32s);
-    binary!(pub min = min_f32s);
-    comparison!(reaches = greater_than_or_equal_f32s);
-    comparison!(exceeds = greater_than_f32s);
-    comparison!(equals = equal_f32s);
+    binary!(
+        /// The greater of both; `other` where self is NaN.
+        pub max = max_f32s
+    );
+    binary!(
+        /// The smaller of both; `other` where self is NaN.
+        pub min = min_f32s
+    );
+    comparison!(
+        /// self >= other
+        reaches = greater_than_or_equal_f32s
+    );
+    comparison!(
+        /// self > other
+        exceeds = greater_than_f32s
+    );
+    comparison!(
+        /// self = other
+        equals = equal_f32s
+    );
 }
 
 impl<S: Simd, const W: usize> Mask<S, W> {
@@ -133,7 +153,7 @@ impl<S: Simd, const W: usize> Mask<S, W> {
         no
     }
 
-    /// Both.
+    /// True where both are.
     #[inline(always)]
     pub fn and(mut self, other: Self) -> Self {
         for (a, b) in self.vectors.iter_mut().zip(other.vectors) {
