@@ -23,8 +23,8 @@ const VALUES_PER_ITEM_MAX: usize = 1 << 16;
 /// fitness although most have one.
 const REFEREED_MIN: u32 = 8;
 
-/// Trials per item: all of them, unless their numbers exceed [`VALUES_PER_ITEM_MAX`].
-fn trials_per_item(batch: &Batch) -> u32 {
+/// Trials per item, at most: all of them, unless their numbers exceed [`VALUES_PER_ITEM_MAX`].
+fn max_trials_per_item(batch: &Batch) -> u32 {
     let n_trials = match batch.output {
         Output::Fitness | Output::Descriptors => batch.n_trials,
         Output::Measures => {
@@ -81,7 +81,7 @@ pub struct BatchInProgress {
 
 /// All items of a batch.
 fn items(batch: &Batch) -> impl Iterator<Item = Item> + use<> {
-    let (n_trials, n_per_item) = (batch.n_trials, trials_per_item(batch));
+    let (n_trials, n_per_item) = (batch.n_trials, max_trials_per_item(batch));
     (0..batch.genotypes.len() as u32).flat_map(move |individual| {
         (0..n_trials).step_by(n_per_item as usize).map(move |first| {
             let last = n_trials.min(first.saturating_add(n_per_item));
@@ -224,7 +224,7 @@ impl BatchInProgress {
 
     /// Takes at most `n_trials` trials, items with all trials first: [`Queue::pop_whole_first`].
     pub fn pop_whole_first(&mut self, n_trials: usize) -> Option<Item> {
-        self.queue.pop_whole_first(n_trials, trials_per_item(&self.request) as usize)
+        self.queue.pop_whole_first(n_trials, max_trials_per_item(&self.request) as usize)
     }
 
     /// Number of values of `n_trials` trials.

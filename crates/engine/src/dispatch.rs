@@ -1,7 +1,7 @@
 //! Assigns queued items to workers.
 //!
-//! First, queued items: the least loaded worker gets the next item of the job with the least
-//! virtual time. The engine splits an item by trial if slots would stay empty otherwise, and
+//! First, queued items: the worker that would finish it first gets the next item of the job with
+//! the least virtual time. The engine splits an item by trial if slots would stay empty otherwise, and
 //! towards the end of a batch.
 //!
 //! Then, while slots are idle, the engine moves items to them from workers with more items than
@@ -98,7 +98,7 @@ impl Engine {
             ItemKind::Audit => self.take_audit(job, worker),
             ItemKind::Suspect => self.batch_mut(job)?.suspects.pop_front(usize::MAX),
             ItemKind::Ordinary => {
-                let n_trials = self.n_trials_per_item(job, &self.workers[&worker]);
+                let n_trials = self.n_trials_to_give(job, &self.workers[&worker]);
                 let is_short = self.is_short(job);
                 let batch = self.batch_mut(job)?;
                 if is_short {
@@ -110,8 +110,8 @@ impl Engine {
         }
     }
 
-    /// The workers with credit that accept a job's items, the least loaded first, each with its
-    /// rank.
+    /// The workers with credit that accept a job's items, the one that would finish an item first
+    /// before all others, each with its rank.
     pub(super) fn takers(&self, work: &JobWork) -> impl Iterator<Item = (u64, WorkerId)> {
         let available = self.load_index.available.iter().map(|&(rank, _, id)| (rank, id));
         available.filter(|(_, id)| self.workers[id].takes(work))
@@ -128,8 +128,8 @@ impl Engine {
     fn hands_out_ahead(&self, id: JobId) -> bool {
         let Some(batch) = self.batch(id) else { return false };
         let n_slots = self.n_slots_each(self.load_index.n_usable_slots);
-        let n_left = batch.request.n_trials as usize * n_slots;
-        !self.config.split || batch.queue.n_trials() > n_left || self.is_short(id)
+        let n_last = batch.request.n_trials as usize * n_slots;
+        !self.config.split || batch.queue.n_trials() > n_last || self.is_short(id)
     }
 
     /// Whether a job's trials take no longer than a round trip; true if their duration is
@@ -138,9 +138,9 @@ impl Engine {
         self.jobs[&id].expected(1, 1.0).is_none_or(|trial| trial < MOVING_COST)
     }
 
-    /// Number of trials of the next item that a worker gets: all of them, unless slots would stay
+    /// Number of trials of the next item that a worker gets, at most: all of them, unless slots would stay
     /// empty, or the worker's share of the rest of the batch is smaller than an item.
-    fn n_trials_per_item(&self, id: JobId, worker: &Worker) -> usize {
+    fn n_trials_to_give(&self, id: JobId, worker: &Worker) -> usize {
         let Some(batch) = self.batch(id).filter(|_| self.config.split) else { return usize::MAX };
         let n_trials = batch.request.n_trials as usize;
         let n_idle_slots = self.n_slots_each(self.load_index.n_idle_slots);

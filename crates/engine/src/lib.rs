@@ -7,16 +7,16 @@
 //! A *job* (`job.rs`) is an experiment or an evaluation. It has at most one *batch* (`batch.rs`)
 //! at a time: genotypes times trials of one trial set. A batch consists of *items* (`item.rs`),
 //! each one genotype and a range of trials. An item given to a worker (`worker.rs`) is an
-//! *assignment*. `BatchInProgress` keeps every item in one of these states (`ItemState`):
+//! *assignment*. `BatchInProgress::state` tells the state of each of its trials (`ItemState`):
 //!
 //! | from | to | when | in |
 //! |---|---|---|---|
 //! | | queued | a batch is requested | `batch.rs` |
 //! | queued | assigned | it is a job's turn (`ready_queue.rs`), and a worker has room (`load_index.rs`) | `dispatch.rs` |
-//! | any but done | done | a worker returns values that contradict no others, late or not | `results.rs`, `known_results.rs` |
+//! | any but done | done | a worker returns values that contradict no others, also after it was written off | `results.rs`, `known_results.rs` |
 //! | assigned | queued | its worker leaves, falls silent, is faulty or stalls (`stalls.rs`); or another worker is free | `results.rs` (`on_no_result`, `requeue`), `dispatch.rs` |
 //! | assigned | queued | its job is paused | `withdraw` here, `batch.rs` (`requeue_all`) |
-//! | assigned | delayed | two workers are lost with duplicates of it at the same time | `results.rs` (`on_no_result`) |
+//! | assigned | delayed | a worker is lost with it within a second of an earlier loss (`losses.rs`) | `results.rs` (`on_no_result`) |
 //! | delayed | queued | the time is over | `results.rs` (`requeue_delayed`) |
 //! | any but done | held | a worker reports that it fails, or workers are lost while they compute it: the referee has to compute it | `trust/verdicts.rs` |
 //! | held | done, or queued | the referee has computed it, or could not | `trust/verdicts.rs` |
@@ -228,7 +228,7 @@ impl Engine {
         self.on_heartbeat(now, id);
         if self.workers.contains_key(&id) {
             self.update_worker(id, |worker| worker.obstacles.is_draining = true);
-            self.finish_waived(now);
+            self.finish_evaluated(now);
         }
     }
 
@@ -274,7 +274,7 @@ impl Engine {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         work.is_paused = false;
         self.update_readiness(id);
-        self.finish_waived(now);
+        self.finish_evaluated(now);
         self.assign(now);
     }
 
@@ -318,7 +318,7 @@ impl Engine {
         self.requeue_delayed(now);
         self.wake_rested(now);
         self.ask_again(now);
-        self.finish_waived(now);
+        self.finish_evaluated(now);
         self.assign(now);
     }
 
@@ -371,7 +371,7 @@ impl Engine {
         for item in worker.in_flight.values().chain(worker.written_off.values()) {
             self.timeline.add(now, (id, &worker), item.clone(), Fate::Lost, Duration::ZERO);
         }
-        let n_suspects = if is_evidence { n_computing } else { 0 };
+        let n_blamed = if is_evidence { n_computing } else { 0 };
         let process = worker.introduction.process;
         let is_alone = n_computing + worker.written_off.len() == 1;
         let loss = WorkerLoss { process, is_alone };
@@ -386,19 +386,19 @@ impl Engine {
         {
             self.forget_holder(assignment_id, &assignment);
             self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
-            let why = match age_rank < n_suspects {
+            let why = match age_rank < n_blamed {
                 true => NoResult::WorkerLost(loss),
                 false => NoResult::TakenBack,
             };
             self.on_no_result(now, assignment, why);
         }
-        self.finish_waived(now);
+        self.finish_evaluated(now);
         n_items
     }
 
     fn forget_job(&mut self, now: Instant, id: JobId) {
         self.withdraw_questions(id, |_| true);
-        // A paused job has no turn.
+        // Takes its items back, and removes it from the ready queue.
         self.pause(now, id);
         self.jobs.remove(&id);
     }

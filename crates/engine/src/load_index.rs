@@ -6,7 +6,7 @@ use model::ids::WorkerId;
 
 use super::worker::{FULL_LOAD, Worker};
 
-/// The workers, sorted by load.
+/// The workers, by what they have to do.
 #[derive(Debug, Default)]
 pub struct WorkerLoadIndex {
     /// Workers with credit, sorted by the time at which they would finish one more item

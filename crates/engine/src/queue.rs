@@ -65,7 +65,7 @@ impl Queue {
 
     /// Like [`Self::pop_front`], but remainders wait while an item of `whole` trials is at the
     /// front. Then the last remainder goes first. So a worker gets whole items, and not pieces that
-    /// are each a call of its own.
+    /// are each a call of its own. A piece that returns to the front goes last.
     pub fn pop_whole_first(&mut self, n_trials: usize, whole: usize) -> Option<Item> {
         let is_whole = self.items.front()?.trials.len() == whole;
         let item = if is_whole { self.items.pop_front() } else { self.items.pop_back() }?;

@@ -66,12 +66,11 @@ impl Engine {
 
     /// Why no correct worker returns this result for an assignment; `None` if one might.
     fn impossibility(&self, assignment: &AssignedItem, result: &ItemResult) -> Option<String> {
-        let batch = self.batch(assignment.job)?;
+        // A batch that has ended may have been of another output.
+        let batch = self.batch_with(assignment.job, assignment.trial_set)?;
         let values = result.outcome.as_ref().ok()?;
         let n_trials = assignment.item.trials.len();
-        if batch.request.trial_set == assignment.trial_set
-            && values.len() != batch.n_values(n_trials)
-        {
+        if values.len() != batch.n_values(n_trials) {
             return Some(format!("it returned {} values for {n_trials} trials", values.len()));
         }
         (batch.request.output != result.output).then(|| {
@@ -170,7 +169,8 @@ impl Engine {
             let auditor = self.party(id).name;
             let Some(batch) = self.batch_mut(job) else { return };
             if batch.computed_by(item) == Some(&auditor) {
-                // The audited value is gone, and the audit's own value takes its place.
+                // The audited value was discarded, and a worker of the auditor's own name has
+                // computed it again.
                 batch.push_audit(item);
             } else {
                 batch.count_audited(item, auditor);
@@ -215,8 +215,8 @@ impl Engine {
         n_new
     }
 
-    /// Finishes batches whose last audits no connected worker can do.
-    pub(super) fn finish_waived(&mut self, now: Instant) {
+    /// Finishes each batch that has no work left: its last audits may have lost their auditors.
+    pub(super) fn finish_evaluated(&mut self, now: Instant) {
         let known = |batch: &BatchInProgress| batch.is_known_throughout();
         let waiting: Vec<JobId> = self
             .jobs
@@ -229,7 +229,8 @@ impl Engine {
         }
     }
 
-    /// Reports a batch that has no work left. If there has been no second worker for a while, the
+    /// Reports a batch that has no work left, or first asks the referee about fitness that is not a
+    /// number. If there has been no second worker for a while, the
     /// engine waives the remaining audits, and counts them.
     pub(super) fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };

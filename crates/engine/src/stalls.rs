@@ -89,6 +89,6 @@ impl Engine {
                 self.on_no_result(now, assignment, NoResult::TakenBack);
             }
         }
-        self.finish_waived(now);
+        self.finish_evaluated(now);
     }
 }

@@ -20,7 +20,7 @@ pub struct Counters {
     /// Items that a worker could not compute.
     pub n_items_failed: u64,
     /// Assignments that ended without a result because their worker left, was lost, stalled, went
-    /// into quarantine, or failed while in doubt; also audits.
+    /// into quarantine, or failed while in doubt. Audits count, too.
     pub n_items_requeued: u64,
     /// Items taken back from a worker because another has the result, or a free slot.
     pub n_items_recalled: u64,

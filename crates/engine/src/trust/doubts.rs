@@ -60,7 +60,7 @@ impl Engine {
                 wrong(&second_values, &first_values, &place(&item, batch.request.trial_set));
             return self.put_in_quarantine(now, &second, &reason);
         };
-        // The rest of their results is compared again after the verdict.
+        // Their other results are compared after the verdict, but late and recalled ones.
         if self.is_doubted(first.id) || self.is_doubted(second.id) {
             return;
         }

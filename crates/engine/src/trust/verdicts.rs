@@ -213,7 +213,7 @@ impl Engine {
             }
         }
         self.discard(&party.name);
-        self.finish_waived(now);
+        self.finish_evaluated(now);
     }
 
     /// Takes everything back from a worker in quarantine.
@@ -273,7 +273,7 @@ impl Engine {
             let reason = reason.map(str::to_owned);
             self.update_worker(id, |worker| worker.obstacles.quarantined = reason);
         }
-        self.finish_waived(now);
+        self.finish_evaluated(now);
         self.assign(now);
         true
     }

@@ -7,7 +7,7 @@ use model::ids::{EvaluationId, JobId, WorkerId};
 use sim_core::{Output, TrialSet};
 
 use super::numbers::{Ask as _, SimulatedFleet, simulated};
-use super::{EXPERIMENT, LEASE, MODEL, fleet};
+use super::{EXPERIMENT, LEASE, MODEL, SECOND, fleet};
 
 /// Number of values of a measured trial.
 const N_VALUES: usize = 1001;
@@ -80,6 +80,30 @@ fn a_result_of_the_wrong_kind_is_proof_enough() {
         assert!(fleet.held(bad).is_empty() && fleet.evaluated.is_empty(), "{is_evaluation}");
         assert_eq!(fleet.quarantined.len(), 1);
     }
+}
+
+#[test]
+fn a_late_result_of_an_ended_batch_proves_nothing() {
+    let mut fleet = fleet();
+    let (late, other) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
+    fleet.submit(EXPERIMENT, 100);
+    let genotypes = (0..100).map(|i| vec![f64::from(i)]).collect();
+    let batch = Batch::described(TrialSet::Generation(0), genotypes, 1, 1);
+    fleet.tell(|engine, now| engine.on_batch_requested(now, EXPERIMENT, batch));
+    let unanswered = fleet.held(late)[0].id;
+    while fleet.evaluated.is_empty() {
+        fleet.run_for(SECOND / 10);
+        if let Some(assignment) = fleet.held(other).into_iter().next() {
+            let values = Ok(vec![assignment.genotype[0], 0.5]);
+            fleet.answer_with(other, assignment.id, Output::Descriptors, values);
+        }
+    }
+    assert!(fleet.status()[0].waits.is_some(), "its item was written off");
+    let block = TrialSet::HeldOut { generation: 0, block: 0 };
+    let candidates = Batch::fitness(block, vec![vec![1.0]].into(), 1);
+    fleet.tell(|engine, now| engine.on_batch_requested(now, EXPERIMENT, candidates));
+    fleet.answer_with(late, unanswered, Output::Descriptors, Ok(vec![0.0, 0.5]));
+    assert!(fleet.quarantined.is_empty(), "{:?}", fleet.quarantined);
 }
 
 #[test]
