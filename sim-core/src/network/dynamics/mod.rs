@@ -1,7 +1,8 @@
 //! The dynamics of networks, with an implementation for each neuron model.
 //!
-//! To add a model: describe it in `experiment-file` (its module `neuron`), implement
-//! [`Dynamics`] in a module beside `ctrnn`, and add a variant to [`Wiring`].
+//! To add a model: describe it in `experiment-file` (its module `neuron`). Equations of a spiking
+//! neuron are a file in `spiking`. Any other model implements [`Dynamics`] in a module beside
+//! `ctrnn`, with a variant of [`Wiring`].
 
 mod aligned;
 mod ctrnn;
