@@ -119,7 +119,7 @@ impl Soak {
                 Place { network, worker, is_troubled: false }
             })
             .collect();
-        let watch = coordinator.watch(coordinator.submit(&experiment.path()));
+        let watch = watch(&coordinator, &experiment);
         Self {
             random: ChaCha8Rng::seed_from_u64(seed),
             coordinator,
@@ -278,12 +278,19 @@ impl Soak {
             })
             .unwrap();
         if n_running == 0 {
-            let id = self.coordinator.submit(&self.experiment.path());
-            let watch = std::mem::replace(&mut self.watch, self.coordinator.watch(id));
-            assert_eq!(watch.finish().digests(), self.expected);
+            let next = watch(&self.coordinator, &self.experiment);
+            let ended = std::mem::replace(&mut self.watch, next);
+            assert_eq!(ended.finish().digests(), self.expected);
             self.n_completed += 1;
         }
     }
+}
+
+/// Submits the experiment; returns a watch that survives any fault from now on.
+fn watch(coordinator: &CoordinatorProcess, experiment: &Experiment) -> Watch {
+    let watch = coordinator.watch(coordinator.submit(&experiment.path()));
+    watch.wait_for_a_generation();
+    watch
 }
 
 /// A bad worker: it lies with values of its own, reports that items fail, or answers nothing.

@@ -201,6 +201,12 @@ pub struct Watch {
 }
 
 impl Watch {
+    /// Waits for the first generation. A watch reconnects to a coordinator that it has reached
+    /// before, and gives up at once on one that it has not.
+    pub fn wait_for_a_generation(&self) {
+        self.process.wait_for("generation", |_| true);
+    }
+
     /// Waits for the experiment to complete.
     pub fn finish(self) -> Finished {
         let (code, finished) = self.end();
