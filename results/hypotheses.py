@@ -49,6 +49,7 @@ LONG_RADIO = {
     "topology.stimuli.I1.n": 3,
     "topology.ensembles.OUT_COMM.n": 3,
 }
+# Enough to tell variants of D apart: after 150 generations, the first three have the verdicts of 300.
 SHORT = {"algorithm.generations": 150}
 # For each experiment, a file of configs/original: the changes of each variant.
 VARIANTS = {
@@ -146,21 +147,22 @@ def report(name):
         for variant in [AS_IT_IS, *VARIANTS[name]]
     }
     ends = sorted({len(means) for runs in variants.values() for means, _ in runs})
-    # Of each column: its head, the generations that a run must have, and its figure of a run.
-    last = lambda end: lambda means, _: statistics.mean(means[end - LAST : end])
-    columns = [(f"mean, generations {end - LAST} to {end - 1}", end, last(end)) for end in ends]
-    columns.append(("champion", ends[-1], lambda _, champion: champion))
+    heads = [*(f"mean, generations {end - LAST} to {end - 1}" for end in ends), "champion"]
+    unchanged = columns(variants[AS_IT_IS], ends)
     rows = []
     for variant, runs in variants.items():
         cells = []
-        for _, end, figure in columns:
-            values, unchanged = (
-                [figure(*run) for run in some if len(run[0]) >= end] for some in (runs, variants[AS_IT_IS])
-            )
-            p = f", p = {chance(values, unchanged):.3f}" if variant != AS_IT_IS and values and unchanged else ""
+        for values, others in zip(columns(runs, ends), unchanged):
+            p = f", p = {chance(values, others):.3f}" if variant != AS_IT_IS and values and others else ""
             cells.append(f"{spread(values)}{p}" if values else "")
         rows.append([variant, len(runs), *cells])
-    return markdown(["variant", "seeds", *(head for head, _, _ in columns)], [row for row in rows if row[1]])
+    return markdown(["variant", "seeds", *heads], [row for row in rows if row[1]])
+
+
+def columns(runs, ends):
+    """The values of each column: means of the last generations up to each end, and the longest runs' champions."""
+    means = [[statistics.mean(run[end - LAST : end]) for run, _ in runs if len(run) >= end] for end in ends]
+    return [*means, [champion for run, champion in runs if len(run) >= ends[-1]]]
 
 
 def read(name, variant, seed):

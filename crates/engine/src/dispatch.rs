@@ -1,8 +1,8 @@
 //! Assigns queued items to workers.
 //!
 //! First, queued items: the worker that would finish it first gets the next item of the job with
-//! the least virtual time. The engine splits an item by trial if slots would stay empty otherwise, and
-//! towards the end of a batch.
+//! the least virtual time. The engine splits an item by trial if slots would stay empty otherwise,
+//! and towards the end of a batch.
 //!
 //! Then, while slots are idle, the engine moves items to them from workers with more items than
 //! slots. It also gives idle slots duplicates of items in progress, if these should finish sooner
@@ -110,8 +110,8 @@ impl Engine {
         }
     }
 
-    /// The workers with credit that accept a job's items, the one that would finish an item first
-    /// before all others, each with its rank.
+    /// The workers with credit that accept a job's items, each with its rank. The worker that would
+    /// finish an item first is the first.
     pub(super) fn takers(&self, work: &JobWork) -> impl Iterator<Item = (u64, WorkerId)> {
         let available = self.load_index.available.iter().map(|&(rank, _, id)| (rank, id));
         available.filter(|(_, id)| self.workers[id].takes(work))
@@ -138,8 +138,8 @@ impl Engine {
         self.jobs[&id].expected(1, 1.0).is_none_or(|trial| trial < MOVING_COST)
     }
 
-    /// Number of trials of the next item that a worker gets, at most: all of them, unless slots would stay
-    /// empty, or the worker's share of the rest of the batch is smaller than an item.
+    /// Number of trials of the next item that a worker gets, at most: all of them, unless slots
+    /// would stay empty, or the worker's share of the rest of the batch is smaller than an item.
     fn n_trials_to_give(&self, id: JobId, worker: &Worker) -> usize {
         let Some(batch) = self.batch(id).filter(|_| self.config.split) else { return usize::MAX };
         let n_trials = batch.request.n_trials as usize;

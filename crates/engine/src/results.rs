@@ -230,8 +230,8 @@ impl Engine {
     }
 
     /// Reports a batch that has no work left, or first asks the referee about fitness that is not a
-    /// number. If there has been no second worker for a while, the
-    /// engine waives the remaining audits, and counts them.
+    /// number. If there has been no second worker for a while, the engine waives the remaining
+    /// audits, and counts them.
     pub(super) fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = work.batch.as_ref().filter(|_| !work.is_paused) else { return };

@@ -60,7 +60,7 @@ impl Engine {
                 wrong(&second_values, &first_values, &place(&item, batch.request.trial_set));
             return self.put_in_quarantine(now, &second, &reason);
         };
-        // Their other results are compared after the verdict, but late and recalled ones.
+        // Their other results are compared after the verdict, except late and recalled ones.
         if self.is_doubted(first.id) || self.is_doubted(second.id) {
             return;
         }

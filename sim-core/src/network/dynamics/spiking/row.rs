@@ -82,7 +82,7 @@ impl<S: Simd, const W: usize> Neg for Row<S, W> {
 }
 
 impl<S: Simd, const W: usize> Row<S, W> {
-    /// These vectors.
+    /// A row of these vectors.
     #[inline(always)]
     pub fn new(simd: S, vectors: [S::f32s; W]) -> Self {
         Self { simd, vectors }
