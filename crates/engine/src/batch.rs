@@ -60,8 +60,8 @@ pub struct BatchInProgress {
     pub suspects: Queue,
     /// The [assigned](ItemState::Assigned) items and their duplicates, by individual.
     holders: BTreeMap<u32, Vec<Holder>>,
-    /// The [delayed](ItemState::Delayed) and [held](ItemState::Held) items; an item is here twice
-    /// if two duplicates of it were lost.
+    /// The [delayed](ItemState::Delayed) and [referred](ItemState::Referred) items; an item is here
+    /// twice if two duplicates of it were lost.
     withheld: Vec<(Item, Until)>,
     /// The results of the trials that are [done](ItemState::Done).
     pub known: KnownResults,
@@ -119,7 +119,7 @@ impl BatchInProgress {
         let withheld = self.withheld.iter().filter(|(item, _)| item.includes(individual, trial));
         let withheld = withheld.map(|(_, until)| match until {
             Until::Time(_) => ItemState::Delayed,
-            Until::Answer => ItemState::Held,
+            Until::Answer => ItemState::Referred,
         });
         withheld.max().unwrap_or_else(|| {
             let is_assigned =
@@ -194,14 +194,14 @@ impl BatchInProgress {
         }
     }
 
-    /// Withholds an item from all workers until [`Self::release`].
-    pub fn hold(&mut self, item: Item) {
+    /// Withholds an item from all workers until the referee's answer, or [`Self::release`].
+    pub fn refer(&mut self, item: Item) {
         let individual = item.individual;
         self.withheld.push((item, Until::Answer));
         self.unqueue(individual);
     }
 
-    /// Takes back [`Self::hold`]; returns whether the item was held.
+    /// Takes back [`Self::refer`]; returns whether the item was referred.
     pub fn release(&mut self, item: &Item) -> bool {
         self.end_withholding(|withheld, until| withheld == item && until == Until::Answer).is_some()
     }
@@ -452,10 +452,10 @@ mod tests {
         assert_eq!(states(&batch), [Assigned; 2]);
         batch.delay(part(0..1), now);
         assert_eq!(states(&batch), [Delayed, Assigned]);
-        batch.hold(whole.clone());
-        assert_eq!(states(&batch), [Held; 2]);
+        batch.refer(whole.clone());
+        assert_eq!(states(&batch), [Referred; 2]);
         batch.known.accept(WorkerId(1), "one", &part(1..2), &[1.0]);
-        assert_eq!(states(&batch), [Held, Done]);
+        assert_eq!(states(&batch), [Referred, Done]);
         assert!(batch.release(&whole) && !batch.release(&whole));
         assert_eq!(states(&batch), [Delayed, Done]);
         assert_eq!(batch.take_due(now), None);

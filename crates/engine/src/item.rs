@@ -13,7 +13,7 @@ pub struct Item {
 
 /// The state of a trial of a batch. The trials of an item share it until the item is divided.
 /// Where several states apply, the last of them counts: workers may still compute duplicates of a
-/// held item, and a result of a duplicate makes the item done.
+/// referred item, and a result of a duplicate makes the item done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ItemState {
     /// It waits in a queue of the batch, in exactly one item.
@@ -22,8 +22,8 @@ pub enum ItemState {
     Assigned,
     /// No worker gets it before a certain time, because workers were lost while they computed it.
     Delayed,
-    /// No worker gets it until the referee has answered.
-    Held,
+    /// It is referred to the referee: no worker gets it until the answer.
+    Referred,
     /// Its result is known.
     Done,
 }

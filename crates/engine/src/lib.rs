@@ -18,8 +18,8 @@
 //! | assigned | queued | its job is paused | `withdraw` here, `batch.rs` (`requeue_all`) |
 //! | assigned | delayed | a worker is lost with it within a second of an earlier loss (`losses.rs`) | `results.rs` (`on_no_result`) |
 //! | delayed | queued | the time is over | `results.rs` (`requeue_delayed`) |
-//! | any but done | held | a worker reports that it fails, or workers are lost while they compute it: the referee has to compute it | `trust/verdicts.rs` |
-//! | held | done, or queued | the referee has computed it, or could not | `trust/verdicts.rs` |
+//! | any but done | referred | a worker reports that it fails, or workers are lost while they compute it: the referee has to compute it | `trust/verdicts.rs` |
+//! | referred | done, or queued | the referee has computed it, or could not | `trust/verdicts.rs` |
 //! | done | queued | its worker is proved faulty | `trust/verdicts.rs` (`discard`) |
 //!
 //! Further workers get slow items as *duplicates* (`dispatch.rs`), and a second worker computes a

@@ -102,7 +102,7 @@ impl<W: Work> SimulatedFleet<W> {
     }
 
     /// The open assignments of a worker that joined by hand.
-    pub fn held(&self, id: WorkerId) -> Vec<Assignment> {
+    pub fn assigned(&self, id: WorkerId) -> Vec<Assignment> {
         let queue = self.workers.get(&id).map(|worker| &worker.queue);
         queue.into_iter().flatten().map(|queued| queued.assignment.clone()).collect()
     }

@@ -77,7 +77,7 @@ pub struct Report {
     /// The workers.
     workers: Vec<WorkerReport>,
     /// The state of each trial of the present batch, individual by individual, as a digit: queued,
-    /// assigned, delayed, held by the referee, done.
+    /// assigned, delayed, referred to the referee, done.
     cells: String,
     /// Individuals of the present batch.
     n_individuals: usize,

@@ -1,10 +1,10 @@
 //! Decides which worker to believe when workers disagree, fail or disappear.
 //!
 //! The rest of the engine reports trouble here. The consequences: items wait
-//! ([`ItemState::Held`], [`ItemState::Delayed`]), workers get nothing ([`Availability`]), workers
+//! ([`ItemState::Referred`], [`ItemState::Delayed`]), workers get nothing ([`Availability`]), workers
 //! compute items only to check others ([`Engine::next_check`]), and batches wait for an audit.
 //!
-//! [`ItemState::Held`]: super::item::ItemState::Held
+//! [`ItemState::Referred`]: super::item::ItemState::Referred
 //! [`ItemState::Delayed`]: super::item::ItemState::Delayed
 //! [`Availability`]: super::availability::Availability
 //!

@@ -155,7 +155,7 @@ impl Question {
 
     /// Whether its item is withheld from workers until the answer. An item that workers have
     /// computed is not withheld, nor is any while the referee cannot answer.
-    pub fn holds(&self) -> bool {
+    pub fn withholds(&self) -> bool {
         matches!(self.doubt, Doubt::Failure { .. } | Doubt::Losses) && self.trouble.is_none()
     }
 

@@ -64,7 +64,7 @@ impl Engine {
             Doubt::NoFitness => {}
             // The result of an audited item is known.
             Doubt::Failure { .. } | Doubt::Losses if batch.is_known(&item) => {}
-            Doubt::Failure { .. } | Doubt::Losses => batch.hold(item),
+            Doubt::Failure { .. } | Doubt::Losses => batch.refer(item),
         }
         let parties: Vec<WorkerId> = question.parties().iter().map(|party| party.id).collect();
         let (id, command) = self.trust.questions.ask(question);
@@ -182,7 +182,7 @@ impl Engine {
             if let Some(batch) = self.batch_of(question) {
                 batch.n_disagreements -= 1;
             }
-        } else if question.holds() {
+        } else if question.withholds() {
             self.release(question);
         }
     }

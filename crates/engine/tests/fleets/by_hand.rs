@@ -89,7 +89,7 @@ fn items_of_a_lost_worker_go_to_others() {
     start(&mut fleet, EXPERIMENT, 10, 2);
     fleet.run_for(SECOND);
     fleet.step(lost);
-    assert_eq!(fleet.held(lost).len(), 3, "long items do not wait in line");
+    assert_eq!(fleet.assigned(lost).len(), 3, "long items do not wait in line");
     fleet.kill(lost);
     fleet.join_by_hand(1);
     fleet.run_by_hand();
@@ -106,7 +106,7 @@ fn a_silent_worker_is_dropped_after_its_lease_and_a_busy_one_is_not() {
     fleet.silence(silent);
     fleet.run_for(LEASE + SECOND);
     assert_eq!(fleet.worker_ids(), [busy]);
-    assert_eq!(fleet.held(busy).len(), 2, "long episodes are no reason to lose work");
+    assert_eq!(fleet.assigned(busy).len(), 2, "long episodes are no reason to lose work");
     fleet.run_by_hand();
     assert_evaluated(&fleet, 6, 1);
 }
@@ -127,7 +127,7 @@ fn results_of_unknown_items_and_of_ended_experiments_are_ignored() {
     let mut fleet = fleet();
     let id = fleet.join_by_hand(1);
     start(&mut fleet, EXPERIMENT, 2, 1);
-    let assignment = fleet.held(id)[0].id;
+    let assignment = fleet.assigned(id)[0].id;
     fleet.answer(id, AssignmentId(999), Ok(vec![5.0]));
     fleet.tell(|engine, now| engine.on_job_ended(now, EXPERIMENT));
     fleet.answer(id, assignment, Ok(vec![5.0]));
@@ -139,7 +139,7 @@ fn a_result_that_comes_twice_counts_once() {
     let mut fleet = fleet();
     let id = fleet.join_by_hand(1);
     start(&mut fleet, EXPERIMENT, 2, 1);
-    let assignment = fleet.held(id)[0].clone();
+    let assignment = fleet.assigned(id)[0].clone();
     fleet.answer(id, assignment.id, Ok(vec![fitness(&assignment.genotype, 0)]));
     fleet.answer(id, assignment.id, Ok(vec![-1.0]));
     fleet.run_by_hand();
@@ -205,5 +205,5 @@ fn ten_thousand_workers_share_a_generation() {
     let ids: Vec<WorkerId> = (0..10_000).map(|_| fleet.join_by_hand(1)).collect();
     start(&mut fleet, EXPERIMENT, 10_000, 1);
     fleet.engine.sanity_check();
-    assert!(ids.into_iter().all(|id| fleet.held(id).len() == 1));
+    assert!(ids.into_iter().all(|id| fleet.assigned(id).len() == 1));
 }

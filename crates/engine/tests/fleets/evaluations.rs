@@ -26,7 +26,7 @@ fn evaluate(fleet: &mut SimulatedFleet, n_trials: u32) {
 
 /// The worker's oldest item, which is one of an evaluation, is computed.
 fn measure(fleet: &mut SimulatedFleet, id: WorkerId) -> bool {
-    let Some(assignment) = fleet.held(id).into_iter().next() else { return false };
+    let Some(assignment) = fleet.assigned(id).into_iter().next() else { return false };
     let values = measures(assignment.trials.clone());
     assert!(values.len() <= 1 << 16, "an answer of {} numbers", values.len());
     fleet.answer_with(id, assignment.id, Output::Measures, Ok(values));
@@ -54,9 +54,9 @@ fn a_worker_that_returns_too_few_or_too_many_measures_gets_nothing_more() {
         let mut fleet = fleet();
         evaluate(&mut fleet, 3);
         let bad = fleet.join_by_hand(1);
-        let assignment = fleet.held(bad)[0].id;
+        let assignment = fleet.assigned(bad)[0].id;
         fleet.answer_with(bad, assignment, Output::Measures, Ok(vec![0.0; n_wrong]));
-        assert!(fleet.held(bad).is_empty(), "{n_wrong}");
+        assert!(fleet.assigned(bad).is_empty(), "{n_wrong}");
         let good = fleet.join_by_hand(1);
         while measure(&mut fleet, good) {}
         assert_eq!(fleet.evaluated[0].1.values, [measures(0..3)]);
@@ -74,10 +74,10 @@ fn a_result_of_the_wrong_kind_is_proof_enough() {
             fleet.ask(EXPERIMENT, 0, 1, N_VALUES as u32);
         }
         let bad = fleet.join_by_hand(1);
-        let assignment = fleet.held(bad)[0].id;
+        let assignment = fleet.assigned(bad)[0].id;
         let wrong = if is_evaluation { Output::Fitness } else { Output::Measures };
         fleet.answer_with(bad, assignment, wrong, Ok(measures(0..1)));
-        assert!(fleet.held(bad).is_empty() && fleet.evaluated.is_empty(), "{is_evaluation}");
+        assert!(fleet.assigned(bad).is_empty() && fleet.evaluated.is_empty(), "{is_evaluation}");
         assert_eq!(fleet.quarantined.len(), 1);
     }
 }
@@ -90,10 +90,10 @@ fn a_late_result_of_an_ended_batch_proves_nothing() {
     let genotypes = (0..100).map(|i| vec![f64::from(i)]).collect();
     let batch = Batch::described(TrialSet::Generation(0), genotypes, 1, 1);
     fleet.tell(|engine, now| engine.on_batch_requested(now, EXPERIMENT, batch));
-    let unanswered = fleet.held(late)[0].id;
+    let unanswered = fleet.assigned(late)[0].id;
     while fleet.evaluated.is_empty() {
         fleet.run_for(SECOND / 10);
-        if let Some(assignment) = fleet.held(other).into_iter().next() {
+        if let Some(assignment) = fleet.assigned(other).into_iter().next() {
             let values = Ok(vec![assignment.genotype[0], 0.5]);
             fleet.answer_with(other, assignment.id, Output::Descriptors, values);
         }
@@ -130,7 +130,7 @@ fn a_difference_is_noticed(output: Output, request: impl Fn(&mut SimulatedFleet)
     for turn in 0.. {
         assert!(turn < 20, "nobody noticed");
         let worker = workers[turn % 2];
-        let Some(assignment) = fleet.held(worker).into_iter().next() else { continue };
+        let Some(assignment) = fleet.assigned(worker).into_iter().next() else { continue };
         let mut values = measures(assignment.trials.clone());
         if worker == workers[1] {
             let last = values.last_mut().unwrap();

@@ -80,8 +80,8 @@ fn a_fast_worker_is_given_more_items_ahead_than_a_slow_one() {
     assert!(fleet.run_until(HOUR, is_finished));
     fleet.run_for(SECOND);
     fleet.ask(EXPERIMENT, 1, 8, 1);
-    let held: Vec<usize> = fleet.status().iter().map(|worker| worker.n_in_flight).collect();
-    assert_eq!(held, [2, 6]);
+    let in_flight: Vec<usize> = fleet.status().iter().map(|worker| worker.n_in_flight).collect();
+    assert_eq!(in_flight, [2, 6]);
 }
 
 #[test]

@@ -28,7 +28,7 @@ fn silence_and_goodbyes_are_no_evidence_against_items() {
     fleet.step(id);
     assert_evaluated(&fleet, 1, 1);
     fleet.ask(EXPERIMENT, 1, 1, 1);
-    assert!(fleet.held(id).is_empty(), "a worker that leaves gets nothing more");
+    assert!(fleet.assigned(id).is_empty(), "a worker that leaves gets nothing more");
 }
 
 #[test]
@@ -37,11 +37,11 @@ fn the_referee_computes_an_item_that_takes_workers_down_and_no_worker_gets_it_me
     start(&mut fleet, EXPERIMENT, 1, 1);
     let mut id = fleet.join_by_hand(1);
     for n_losses in 1..=2 {
-        assert_eq!((fleet.held(id).len(), fleet.n_questions), (1, 0), "{n_losses}");
+        assert_eq!((fleet.assigned(id).len(), fleet.n_questions), (1, 0), "{n_losses}");
         fleet.run_for(2 * SECOND);
         id = fleet.restart(id).unwrap();
     }
-    assert_eq!((fleet.held(id).len(), fleet.n_questions), (0, 1));
+    assert_eq!((fleet.assigned(id).len(), fleet.n_questions), (0, 1));
     fleet.run_for(SECOND);
     // Something else killed the workers, since the referee has computed the item.
     assert_evaluated(&fleet, 1, 1);
@@ -96,7 +96,7 @@ fn items_that_wait_in_a_lost_worker_are_not_suspects() {
     start(&mut fleet, EXPERIMENT, 2, 1);
     // One slot, two credits: individual 0 is computed, 1 waits.
     let id = fleet.join_by_hand(1);
-    assert_eq!(fleet.held(id).len(), 2);
+    assert_eq!(fleet.assigned(id).len(), 2);
     fleet.kill(id);
     assert_eq!(fleet.activity(EXPERIMENT).batch.unwrap().n_individuals_failing, 1);
 }
@@ -107,13 +107,13 @@ fn a_failure_that_the_referee_sees_too_fails_the_experiment_at_once() {
     fleet.work.failing.insert(0);
     let id = fleet.join_by_hand(1);
     start(&mut fleet, EXPERIMENT, 1, 1);
-    let assignment = fleet.held(id)[0].id;
+    let assignment = fleet.assigned(id)[0].id;
     fleet.answer(id, assignment, Err("it overflowed".to_owned()));
     fleet.run_for(SECOND);
     assert!(fleet.failed[0].1.contains("it overflowed"), "{:?}", fleet.failed);
     assert!(fleet.quarantined.is_empty(), "the worker is not to blame");
     start(&mut fleet, JobId::Experiment(ExperimentId(2)), 1, 1);
-    assert_eq!(fleet.held(id).len(), 1);
+    assert_eq!(fleet.assigned(id).len(), 1);
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn a_failure_that_the_referee_contradicts_puts_its_reporter_in_quarantine() {
     let mut fleet = fleet();
     let (liar, honest) = (fleet.join_by_hand(2), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 5, 1);
-    for assignment in fleet.held(liar) {
+    for assignment in fleet.assigned(liar) {
         fleet.answer(liar, assignment.id, Err("I cannot".to_owned()));
     }
     assert_eq!(fleet.n_questions, 1, "one is enough");
@@ -131,14 +131,14 @@ fn a_failure_that_the_referee_contradicts_puts_its_reporter_in_quarantine() {
     assert!(name == "worker-1" && reason.contains("I cannot"), "{reason}");
     // It is recognised when it reconnects.
     let liar = fleet.restart(liar).unwrap();
-    assert!(fleet.held(liar).is_empty() && fleet.status()[1].quarantined.is_some());
+    assert!(fleet.assigned(liar).is_empty() && fleet.status()[1].quarantined.is_some());
     while fleet.step(honest) {}
     assert_evaluated(&fleet, 5, 1);
     // An operator has mended it.
     fleet.ask(EXPERIMENT, 1, 5, 1);
     fleet.tell(|engine, now| assert!(engine.on_readmitted(now, "worker-1")));
     fleet.run_for(SECOND);
-    assert!(!fleet.held(liar).is_empty());
+    assert!(!fleet.assigned(liar).is_empty());
     fleet.tell(|engine, now| assert!(!engine.on_readmitted(now, "worker-1")));
 }
 
@@ -148,7 +148,7 @@ fn one_of_two_workers_in_quarantine_for_the_same_reason_is_readmitted_and_the_ot
     let workers = [fleet.join_by_hand(1), fleet.join_by_hand(1)];
     start(&mut fleet, EXPERIMENT, 4, 2);
     for id in workers {
-        let assignment = fleet.held(id)[0].id;
+        let assignment = fleet.assigned(id)[0].id;
         fleet.answer(id, assignment, Ok(vec![1.0]));
     }
     let reasons = fleet.status().into_iter().map(|worker| worker.quarantined.unwrap());
@@ -165,11 +165,11 @@ fn without_a_referee_workers_with_most_of_the_slots_confirm_a_failure() {
     fleet.work.has_referee = false;
     let (first, second) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 1, 1);
-    let assignment = fleet.held(first)[0].id;
+    let assignment = fleet.assigned(first)[0].id;
     fleet.answer(first, assignment, Err("it overflowed".to_owned()));
     fleet.run_for(SECOND);
     assert!(fleet.failed.is_empty());
-    let assignment = fleet.held(second)[0].id;
+    let assignment = fleet.assigned(second)[0].id;
     fleet.answer(second, assignment, Err("it overflowed".to_owned()));
     assert_eq!(fleet.failed.len(), 1);
 }
@@ -183,7 +183,7 @@ fn without_a_referee_workers_with_fewer_slots_confirm_no_failure() {
     start(&mut fleet, EXPERIMENT, 1, 1);
     for _ in 0..10 {
         for liar in liars {
-            for assignment in fleet.held(liar) {
+            for assignment in fleet.assigned(liar) {
                 fleet.answer(liar, assignment.id, Err("I cannot".to_owned()));
             }
         }
@@ -196,7 +196,7 @@ fn without_a_referee_workers_with_fewer_slots_confirm_no_failure() {
 
 /// A worker that joined by hand returns NaN for all of its items.
 fn find_no_fitness(fleet: &mut SimulatedFleet, id: WorkerId) {
-    while let Some(assignment) = fleet.held(id).first() {
+    while let Some(assignment) = fleet.assigned(id).first() {
         let values = vec![f64::NAN; assignment.trials.len()];
         fleet.answer(id, assignment.id, Ok(values));
     }
@@ -237,9 +237,9 @@ fn failures_of_the_same_individual_in_two_generations_do_not_confirm_each_other(
     let workers = [(); 3].map(|()| fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 1, 1);
     for generation in 0..2 {
-        let mut holders = workers.iter().filter(|&&id| !fleet.held(id).is_empty());
+        let mut holders = workers.iter().filter(|&&id| !fleet.assigned(id).is_empty());
         let reporter = *holders.next().unwrap();
-        let assignment = fleet.held(reporter)[0].id;
+        let assignment = fleet.assigned(reporter)[0].id;
         fleet.answer(reporter, assignment, Err("it overflowed".to_owned()));
         fleet.run_for(SECOND);
         fleet.run_by_hand();
@@ -254,7 +254,7 @@ fn without_a_referee_work_goes_on_and_the_question_stays_open() {
     fleet.work.has_referee = false;
     let (liar, honest) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 4, 1);
-    let assignment = fleet.held(liar)[0].id;
+    let assignment = fleet.assigned(liar)[0].id;
     fleet.answer(liar, assignment, Err("I cannot".to_owned()));
     fleet.run_for(SECOND);
     while fleet.step(honest) {}
@@ -272,9 +272,9 @@ fn a_result_of_the_wrong_length_is_proof_enough() {
     let mut fleet = fleet();
     let id = fleet.join_by_hand(1);
     start(&mut fleet, EXPERIMENT, 1, 2);
-    let assignment = fleet.held(id)[0].id;
+    let assignment = fleet.assigned(id)[0].id;
     fleet.answer(id, assignment, Ok(vec![1.0]));
-    assert!(fleet.held(id).is_empty() && fleet.evaluated.is_empty());
+    assert!(fleet.assigned(id).is_empty() && fleet.evaluated.is_empty());
     assert!(fleet.quarantined[0].1.contains("1 values for 2 trials"), "{:?}", fleet.quarantined);
 }
 
@@ -284,11 +284,11 @@ fn fleet_with_a_late_item() -> (SimulatedFleet, [WorkerId; 3], Assignment) {
     let mut fleet = fleet();
     let workers = [fleet.join_by_hand(1), fleet.join_by_hand(1), fleet.join_by_hand(1)];
     start(&mut fleet, EXPERIMENT, 3, 1);
-    let late = fleet.held(workers[2])[0].clone();
+    let late = fleet.assigned(workers[2])[0].clone();
     fleet.run_for(SECOND / 10);
     fleet.step(workers[0]);
     fleet.run_for(SECOND / 2);
-    let copy = &fleet.held(workers[0])[0];
+    let copy = &fleet.assigned(workers[0])[0];
     assert_eq!((&copy.genotype, &copy.trials), (&late.genotype, &late.trials));
     (fleet, workers, late)
 }
@@ -297,7 +297,7 @@ fn fleet_with_a_late_item() -> (SimulatedFleet, [WorkerId; 3], Assignment) {
 fn the_first_of_two_results_wins_and_the_other_worker_drops_the_item() {
     let (mut fleet, [first, _, third], late) = fleet_with_a_late_item();
     fleet.step(first);
-    assert!(fleet.held(third).iter().all(|assignment| assignment.id != late.id));
+    assert!(fleet.assigned(third).iter().all(|assignment| assignment.id != late.id));
     // Its answer was already on its way.
     fleet.answer(third, late.id, Ok(vec![fitness(&late.genotype, 0)]));
     assert_eq!(fleet.n_questions, 0);
@@ -325,7 +325,7 @@ fn results_of_a_liar_are_computed_again() {
     let mut fleet = simulated(MODEL, config);
     let (liar, honest) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 4, 1);
-    for assignment in fleet.held(liar) {
+    for assignment in fleet.assigned(liar) {
         fleet.answer(liar, assignment.id, Ok(vec![-1.0]));
     }
     while fleet.quarantined.is_empty() {
@@ -366,18 +366,18 @@ fn a_worker_that_comes_back_after_a_loss_is_given_one_item_until_it_returns_some
     let mut fleet = plain_fleet();
     let (id, other) = (fleet.join_by_hand(8), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 40, 1);
-    assert!(fleet.held(id).len() > 1);
+    assert!(fleet.assigned(id).len() > 1);
     let id = fleet.restart(id).unwrap();
-    assert!(fleet.held(id).is_empty(), "it waits, because another worker can compute");
+    assert!(fleet.assigned(id).is_empty(), "it waits, because another worker can compute");
     fleet.run_for(SECOND);
-    assert_eq!(fleet.held(id).len(), 1);
+    assert_eq!(fleet.assigned(id).len(), 1);
     fleet.step(id);
-    assert!(fleet.held(id).len() > 1);
+    assert!(fleet.assigned(id).len() > 1);
     // It is the only worker.
     let id = fleet.restart(id).unwrap();
     fleet.drain(other);
     fleet.run_for(SECOND / 5);
-    assert_eq!(fleet.held(id).len(), 1);
+    assert_eq!(fleet.assigned(id).len(), 1);
 }
 
 #[test]
@@ -395,7 +395,7 @@ fn a_worker_without_results_gets_nothing_until_it_returns_one() {
     let mut fleet = fleet();
     let (hung, other) = (fleet.join_by_hand(4), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 100, 1);
-    let late = fleet.held(hung)[0].clone();
+    let late = fleet.assigned(hung)[0].clone();
     for _ in 0..40 {
         fleet.run_for(SECOND / 10);
         fleet.step(other);
@@ -422,7 +422,7 @@ fn a_stalled_worker_is_served_again_when_its_items_are_no_longer_needed() {
     assert!(fleet.status()[0].waits.is_some());
     fleet.tell(|engine, now| engine.on_job_ended(now, EXPERIMENT));
     start(&mut fleet, JobId::Experiment(ExperimentId(2)), 100, 1);
-    assert!(fleet.status()[0].waits.is_none() && !fleet.held(hung).is_empty());
+    assert!(fleet.status()[0].waits.is_none() && !fleet.assigned(hung).is_empty());
 }
 
 #[test]
@@ -430,7 +430,7 @@ fn the_death_of_the_referee_is_no_proof_against_workers_that_were_not_lost() {
     let mut fleet = fleet();
     let (reporter, other) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
     start(&mut fleet, EXPERIMENT, 4, 1);
-    let reported = fleet.held(reporter)[0].clone();
+    let reported = fleet.assigned(reporter)[0].clone();
     fleet.work.poisonous.insert(reported.genotype[0] as u64);
     fleet.answer(reporter, reported.id, Err("out of memory".to_owned()));
     fleet.run_for(60 * SECOND);
@@ -446,12 +446,12 @@ fn an_item_computed_by_two_is_audited_in_parts_by_others() {
     fleet.submit(EXPERIMENT, 100);
     fleet.ask(EXPERIMENT, 0, 1, 5);
     let faulty = fleet.join_by_hand(1);
-    let whole = fleet.held(faulty)[0].clone();
+    let whole = fleet.assigned(faulty)[0].clone();
     assert_eq!(whole.trials, 0..5);
     let other = fleet.join_by_hand(2);
     // Without any result, the duration of an item is unknown; it counts as late after a while.
     fleet.run_for(6 * SECOND);
-    let copies = fleet.held(other);
+    let copies = fleet.assigned(other);
     assert_eq!(copies[0].trials.start, 0);
     fleet.step(other);
     let values =
@@ -461,8 +461,8 @@ fn an_item_computed_by_two_is_audited_in_parts_by_others() {
         fleet.run_for(SECOND / 2);
         fleet.step(other);
         // It computes its audits correctly.
-        let held = fleet.held(faulty);
-        assert!(held.iter().all(|assignment| !assignment.trials.contains(&4)), "its own");
+        let rest = fleet.assigned(faulty);
+        assert!(rest.iter().all(|assignment| !assignment.trials.contains(&4)), "its own");
         fleet.step(faulty);
     }
     assert_evaluated(&fleet, 1, 5);
