@@ -4,8 +4,7 @@ use std::cmp::Ordering;
 use std::rc::Rc;
 
 use crate::code::{Binary, Builtin, Method};
-use crate::error::{Fault, Outcome, shortened};
-use crate::key::Key;
+use crate::error::{Fault, MESSAGE_CHARS, Outcome, shortened};
 use crate::meter::{Meter, cost};
 use crate::value::{Dict, ELEMENT, List, Value};
 
@@ -125,7 +124,7 @@ fn contains(container: &Value, value: &Value, meter: &Rc<Meter>) -> Outcome<bool
             }
             Ok(false)
         }
-        Value::Dict(dict) => Ok(dict.get(&Key::new(value)?)?.is_some()),
+        Value::Dict(dict) => Ok(dict.get(&dict.key(value)?)?.is_some()),
         Value::Text(_) => {
             let text = container.as_text().unwrap_or_default();
             meter.work(text.len())?;
@@ -207,7 +206,7 @@ pub(crate) fn element(container: &Value, index: &Value) -> Outcome<Value> {
             let place = place(index, list.len())?;
             Ok(list.get(place).expect("the place is below the length"))
         }
-        Value::Dict(dict) => dict.get(&Key::new(index)?)?.ok_or_else(|| {
+        Value::Dict(dict) => dict.get(&dict.key(index)?)?.ok_or_else(|| {
             format!("the dict has no key {}", shortened(&format!("{index:?}"))).into()
         }),
         _ => Err(format!("{} has no elements", container.kind_with_article()).into()),
@@ -302,9 +301,9 @@ fn dict_method(
     meter: &Rc<Meter>,
 ) -> Outcome<Value> {
     Ok(match (method, arguments) {
-        (Method::Get, [key]) => dict.get(&Key::new(key)?)?.unwrap_or(Value::Nothing),
+        (Method::Get, [key]) => dict.get(&dict.key(key)?)?.unwrap_or(Value::Nothing),
         (Method::Get, [key, default]) => {
-            dict.get(&Key::new(key)?)?.unwrap_or_else(|| default.clone())
+            dict.get(&dict.key(key)?)?.unwrap_or_else(|| default.clone())
         }
         (Method::Keys, []) => Value::list(keys(dict, meter)?, meter)?,
         (Method::Values | Method::Items, []) => {
@@ -320,7 +319,7 @@ fn dict_method(
             Value::list(items, meter)?
         }
         (Method::Pop, [key] | [key, _]) => {
-            match (dict.remove(&Key::new(key)?)?, arguments.get(1)) {
+            match (dict.remove(&dict.key(key)?)?, arguments.get(1)) {
                 (Some(value), _) => value,
                 (None, Some(default)) => default.clone(),
                 (None, None) => return Err("the dict has no such key".into()),
@@ -461,9 +460,10 @@ fn range(from: &Value, to: &Value, step: &Value, meter: &Rc<Meter>) -> Outcome<V
     Ok(Value::list(numbers.collect(), meter)?)
 }
 
+/// The words of `fail`, which copies no more of them than a message has.
 fn failure(arguments: &[Value]) -> Fault {
-    let words = arguments.iter().map(|value| match value.as_text() {
-        Some(text) => text.to_owned(),
+    let words = arguments.iter().take(1 + MESSAGE_CHARS).map(|value| match value.as_text() {
+        Some(text) => shortened(text),
         None => format!("{value:?}"),
     });
     shortened(&words.collect::<Vec<_>>().join(" ")).into()

@@ -13,7 +13,7 @@ pub struct ScriptError {
 }
 
 /// Most characters of a message that a script writes itself.
-const MESSAGE_CHARS: usize = 200;
+pub(crate) const MESSAGE_CHARS: usize = 200;
 
 /// A problem without its file and, at first, without its line.
 #[derive(Debug, Clone, PartialEq)]

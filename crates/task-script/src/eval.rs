@@ -7,7 +7,6 @@ use crate::code::{
     Binary, Clause, ElementKey, Expr, Function, Op, Order, Stmt, StmtKind, Target, Which,
 };
 use crate::error::{Fault, Outcome};
-use crate::key::Key;
 use crate::meter::{Meter, cost};
 use crate::sort_keys::Keys;
 use crate::value::Value;
@@ -484,7 +483,7 @@ impl Machine<'_> {
 fn store(container: &Value, index: &Value, value: Value) -> Outcome<()> {
     match container {
         Value::List(list) => list.set(builtins::place(index, list.len())?, value),
-        Value::Dict(dict) => dict.set(Key::new(index)?, value),
+        Value::Dict(dict) => dict.set(dict.key(index)?, value),
         _ => Err(format!("{} has no elements", container.kind_with_article()).into()),
     }
 }

@@ -20,24 +20,32 @@ pub(crate) enum Key {
 }
 
 impl Key {
-    /// Converts a value to a key.
-    pub(crate) fn new(value: &Value) -> Result<Self, String> {
-        Self::within(value, COMPARED_DEPTH)
+    /// Converts a value to a key. Fails if there is no room for the copy, because a tuple may
+    /// contain the same text many times.
+    pub(crate) fn new(value: &Value, meter: &Meter) -> Result<Self, String> {
+        Self::within(value, COMPARED_DEPTH, &mut Copying { meter, bytes: 0 })
     }
 
-    fn within(value: &Value, depth: usize) -> Result<Self, String> {
+    fn within(value: &Value, depth: usize, copying: &mut Copying<'_>) -> Result<Self, String> {
         Ok(match value {
             Value::Nothing => Self::Nothing,
             Value::Bool(value) => Self::Bool(*value),
             Value::Int(value) => Self::Int(*value),
             Value::Float(value) => match whole(*value) {
                 Some(value) => Self::Int(value),
+                // Processors differ in the sign of NaN.
+                None if value.is_nan() => Self::Float(f64::NAN.to_bits()),
                 None => Self::Float(value.to_bits()),
             },
-            Value::Text(_) => Self::Text(value.read_text()?.unwrap_or_default().to_owned()),
+            Value::Text(_) => {
+                let text = value.read_text()?.unwrap_or_default();
+                copying.grow(text.len())?;
+                Self::Text(text.to_owned())
+            }
             Value::List(list) if list.is_tuple() && depth > 0 => {
                 let keys = list.items()?;
-                let keys = keys.iter().map(|value| Self::within(value, depth - 1));
+                copying.grow(keys.len() * size_of::<Self>())?;
+                let keys = keys.iter().map(|value| Self::within(value, depth - 1, copying));
                 Self::Tuple(keys.collect::<Result<_, _>>()?)
             }
             Value::Object(object) => Self::Object(*object),
@@ -68,6 +76,19 @@ impl Key {
             }
             Self::Object(object) => Value::Object(*object),
         })
+    }
+}
+
+/// The copy of a value that becomes a key.
+struct Copying<'m> {
+    meter: &'m Meter,
+    bytes: usize,
+}
+
+impl Copying<'_> {
+    fn grow(&mut self, bytes: usize) -> Result<(), String> {
+        self.bytes += bytes;
+        self.meter.check_room(self.bytes)
     }
 }
 

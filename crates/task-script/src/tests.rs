@@ -264,6 +264,11 @@ fn texts_that_are_too_deep_or_too_long_are_refused() {
         nested("abs(", ")", 5000),
         nested("{1: ", "}", 5000),
         nested("1 if 1 else ", "", 2000),
+        nested("[a for a in ", "]", 2700),
+        nested("[a for a in [1] if ", "]", 1500),
+        format!("def f(x):\n    return {}{}", "[for in".repeat(4000), "]".repeat(4000)),
+        format!("def f(x):\n    return [1{}]", " for a in x".repeat(2900)),
+        format!("def f(x):\n    return {{1: 1{}}}", " if x".repeat(3000)),
         format!("def f(x):\n    return x{}", ".heading".repeat(3000)),
         format!("def f(x):\n    {}x = 1", "(".repeat(5000)),
         "#".repeat(40_000),
@@ -273,6 +278,26 @@ fn texts_that_are_too_deep_or_too_long_are_refused() {
     }
     let elifs = "    elif x: pass\n".repeat(1500);
     assert!(compile(&format!("def f(x):\n    if x: pass\n{elifs}")).is_ok());
+}
+
+#[test]
+fn the_deepest_script_fits_the_stack_of_a_thread() {
+    let blocks: String = (1..19).map(|n| format!("{}for b in [1]:\n", " ".repeat(n))).collect();
+    let (open, close) = ("[".repeat(23), " for a in [1]]".repeat(23));
+    let value = format!("{open}f(n - 1) if n else 0{close}");
+    let text = format!("def f(n):\n{blocks}{}return {value}\n", " ".repeat(19));
+    let text = format!("{text}def main():\n    return len(f(14))");
+    // A thread has this much by default.
+    let thread = std::thread::Builder::new().stack_size(2 << 20);
+    let is_one = move || matches!(run(&text).unwrap(), Value::Int(1));
+    assert!(thread.spawn(is_one).unwrap().join().unwrap());
+}
+
+#[test]
+fn every_nan_is_the_same_key() {
+    let entries = "n = math.inf - math.inf\n    d = {n: 1, abs(n): 2, -abs(n): 3}";
+    let text = format!("def f():\n    {entries}\n    return len(d) == 1 and d[n] == 3");
+    assert!(run(&text).unwrap().is_true());
 }
 
 #[test]

@@ -72,7 +72,7 @@ const VALUES: &str = "
 ";
 
 /// Expressions that cost more than a statement.
-const EXPRESSIONS: [&str; 46] = [
+const EXPRESSIONS: [&str; 47] = [
     "u < v",
     "u >= v",
     "u == v",
@@ -100,6 +100,7 @@ const EXPRESSIONS: [&str; 46] = [
     "pairs == [x for x in pairs]",
     "p == q",
     "p in [q]",
+    "p in d",
     "{p: 1}",
     "-1 in numbers",
     "numbers.index(8)",
@@ -172,6 +173,29 @@ fn expensive(draw: &mut Draw, functions: &str) -> String {
         _ => format!("for i in range(30000):\n        if [{line}] == i: pass"),
     };
     format!("{functions}def main():{values}    {body}\n    return 1\n")
+}
+
+/// Largest allowed peak memory of this process, KiB; a script may keep one MiB.
+const PEAK_KIB: u64 = 128 << 10;
+
+#[test]
+fn what_a_script_does_not_keep_takes_little_memory() {
+    let values = VALUES.replace("LENGTH", "13").replace("COUNT", "1");
+    let deeper = "    for i in range(6):\n        p = (p, p)\n";
+    let many = vec!["u"; 6000].join(", ");
+    for line in ["    p in {}".into(), "    {p: 1}".into(), format!("    fail({many})")] {
+        let text = format!("def main():{values}{deeper}{line}\n");
+        let limits = Limits { work: 3_000_000, ..LIMITS };
+        let error = run(&text, limits, Nowhere(Cell::new(u32::MAX))).unwrap_err();
+        let known = ["keeps too much", "abcdefgh"];
+        assert!(known.iter().any(|message| error.message.contains(message)), "{error}");
+    }
+    // Not every system reports the peak memory.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    if let Some(peak) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
+        let peak: u64 = peak.trim().trim_end_matches(" kB").parse().unwrap();
+        assert!(peak < PEAK_KIB, "{peak} KiB");
+    }
 }
 
 #[test]

@@ -68,7 +68,7 @@ impl Parser<'_> {
                 if !self.accept_word("in") {
                     return Err(self.fault("expected `in`"));
                 }
-                let list = self.any_of()?;
+                let list = self.clause()?;
                 let after = std::mem::replace(&mut self.at, target_at);
                 let target = self.targets()?;
                 if !self.accept_word("in") {
@@ -80,7 +80,7 @@ impl Parser<'_> {
                 self.at = after;
                 clauses.push(Clause::For(target, list));
             } else if self.accept_word("if") {
-                clauses.push(Clause::If(self.any_of()?));
+                clauses.push(Clause::If(self.clause()?));
             } else {
                 break;
             }
@@ -94,6 +94,14 @@ impl Parser<'_> {
         self.scope.close(mark);
         self.at = end;
         Ok(Some((clauses, value)))
+    }
+
+    /// The list or condition of a clause: a nested expression, which ends before `if`.
+    fn clause(&mut self) -> Outcome<Expr> {
+        self.deeper()?;
+        let value = self.any_of()?;
+        self.depth -= 1;
+        Ok(value)
     }
 
     /// The index of the first clause, if these brackets contain a comprehension.

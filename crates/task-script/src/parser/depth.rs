@@ -7,17 +7,19 @@ pub(super) fn within(op: &Op) -> u16 {
     fn deepest<'e>(of: impl IntoIterator<Item = &'e Expr>) -> u16 {
         of.into_iter().map(|expr| expr.depth).max().unwrap_or(0)
     }
-    let clauses = |clauses: &[Clause]| {
+    // Every clause is executed within the one before it, and the value within the last one.
+    let comprehension = |value: u16, clauses: &[Clause]| {
         let lists = clauses.iter().map(|clause| match clause {
             Clause::For(_, expr) | Clause::If(expr) => expr.depth,
         });
-        lists.max().unwrap_or(0)
+        let n_clauses = u16::try_from(clauses.len()).unwrap_or(u16::MAX);
+        lists.max().unwrap_or(0).max(value).saturating_add(n_clauses)
     };
     match op {
         Op::List(of) | Op::Tuple(of) | Op::Call(_, of) | Op::Builtin(_, of) => deepest(of),
         Op::Dict(of) => of.iter().map(|(key, value)| key.depth.max(value.depth)).max().unwrap_or(0),
-        Op::ListOf(of, over) => of.depth.max(clauses(over)),
-        Op::DictOf(of, over) => of.0.depth.max(of.1.depth).max(clauses(over)),
+        Op::ListOf(of, over) => comprehension(of.depth, over),
+        Op::DictOf(of, over) => comprehension(of.0.depth.max(of.1.depth), over),
         Op::Not(of) | Op::Negative(of) | Op::Positive(of) | Op::Attribute(of, _) => of.depth,
         Op::Binary(_, of) | Op::And(of) | Op::Or(of) | Op::Index(of) => of.0.depth.max(of.1.depth),
         Op::If(of) => of.0.depth.max(of.1.depth).max(of.2.depth),

@@ -399,7 +399,7 @@ impl<'a> Parser<'a> {
 
     /// An expression, unless it is too deep.
     pub(super) fn expr(&self, line: u32, op: Op) -> Outcome<Expr> {
-        let depth = 1 + super::depth::within(&op);
+        let depth = super::depth::within(&op).saturating_add(1);
         if depth > DEPTH {
             let message = "too many operations in one expression; use variables";
             return Err(crate::error::Fault::new(line, message));

@@ -198,6 +198,11 @@ impl Dict {
         self.entries.borrow().get(&Key::Text(key.to_owned())).cloned()
     }
 
+    /// Converts a value to a key of this dict.
+    pub(crate) fn key(&self, value: &Value) -> Result<Key, String> {
+        Key::new(value, &self.meter)
+    }
+
     pub(crate) fn get(&self, key: &Key) -> Result<Option<Value>, String> {
         self.pay_for(key)?;
         Ok(self.entries.borrow().get(key).cloned())
