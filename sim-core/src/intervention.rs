@@ -36,9 +36,11 @@ pub enum Thing {
 pub enum Act {
     /// A light or an area goes out, so no sensor sees it. A robot fails for good: it stands still,
     /// its LED is off, it hears nothing, no robot hears it or senses it, and nothing meets its
-    /// body. The task still counts it where it was.
+    /// body. In a script's `sense` and `control`, it is nobody's neighbour. The task still counts
+    /// it where it was.
     Remove,
-    /// A robot stands still, whatever its controller decides, and a light stays where it is.
+    /// A robot stands still, whatever its controller decides, and a light stays where it is,
+    /// whatever moves it.
     Freeze,
     /// A robot's transmitter emits nothing.
     Mute,

@@ -71,11 +71,6 @@ impl LightPath {
         Self { stream, motion }
     }
 
-    /// Stays where it is from now on.
-    pub fn stop(&mut self) {
-        self.motion = Motion::Static;
-    }
-
     /// Goes on from a place to which somebody has put the light.
     pub fn go_on_from(&mut self, position: Vec2, torus: &Torus) {
         if let Motion::Orbit { angle, radius, .. } = &mut self.motion {

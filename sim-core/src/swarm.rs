@@ -33,6 +33,8 @@ pub(crate) struct Swarm {
     pub photosensitive: Vec<bool>,
     /// Whether each robot has failed: it stands still, its LED is off, and no robot hears it.
     pub failed: Vec<bool>,
+    /// Whether an intervention has removed each robot; empty if none has.
+    pub removed: Vec<bool>,
     /// Whether each robot carries something.
     pub carries: Vec<bool>,
     /// Headings of the radios, in \[0, 2 pi); empty if they are those of their robots.
@@ -102,6 +104,7 @@ impl Swarm {
             message_len,
             photosensitive: vec![false; n],
             failed: vec![false; n],
+            removed: Vec::new(),
             carries: vec![false; n],
             antenna_headings: Vec::new(),
             radio_flaws: Vec::new(),
@@ -160,6 +163,19 @@ impl Swarm {
     /// Range of a robot's message in `messages` and `received_messages`.
     pub fn message_range(&self, robot: usize) -> Range<usize> {
         robot * self.message_len..(robot + 1) * self.message_len
+    }
+
+    /// Removes a robot for good.
+    pub fn remove(&mut self, robot: usize) {
+        self.removed.resize(self.positions.len(), false);
+        self.removed[robot] = true;
+        // Its neighbours lose it.
+        self.moved = true;
+    }
+
+    /// Whether a robot is removed, so that no other robot senses it.
+    pub fn is_removed(&self, robot: usize) -> bool {
+        self.removed.get(robot) == Some(&true)
     }
 
     /// Stops failed robots, and turns their LEDs off.

@@ -193,25 +193,26 @@ impl<'a> Trial<'a> {
     /// Start of a step: every robot senses at its present position and heading, and hears the
     /// frames on the air. The script plans the actions of its robots.
     pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
-        self.intervene(step)?;
         let mut moved = mem::replace(&mut self.swarm.moved, false);
-        let turned = mem::replace(&mut self.swarm.turned, false);
-        // A switch of the topology moves robots elsewhere.
+        let mut turned = mem::replace(&mut self.swarm.turned, false);
+        // Interventions and switches of the topology are changes of this step, for its score, too.
+        self.intervene(step)?;
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
             if state.perturbations.switches_topology(step) {
                 let torus = &self.world.torus;
                 let positions = self.address.place(&group.site, torus, &mut state.positions)?;
                 self.swarm.positions[group.robots.clone()].copy_from_slice(&positions);
                 self.swarm.moved = true;
-                moved = true;
             }
         }
+        moved |= self.swarm.moved;
+        turned |= self.swarm.turned;
         // Neighbours change only when a robot moves, and hearing only when a robot moves or
         // turns.
         if moved {
             self.neighbours.update(&self.world.torus, &self.swarm.positions);
-            if let Some(watched) = &self.watched {
-                watched.retain_present(&mut self.neighbours);
+            if !self.swarm.removed.is_empty() {
+                self.neighbours.retain(|_, neighbour| !self.swarm.is_removed(neighbour.robot));
             }
         }
         if let (true, Some(audible), Some(interior)) = (moved, &mut self.audible, &self.interior) {
@@ -419,9 +420,14 @@ impl<'a> Trial<'a> {
 
     /// End of a step: lights and ground areas move.
     pub fn move_things(&mut self, step: u32) -> Result<(), EvaluateError> {
+        let watched = self.watched.as_ref();
+        let frozen = watched.map_or_else(Vec::new, |watched| watched.frozen_lights(&self.lights));
         self.run_script(step, ScriptRun::move_things)?;
         for (position, path) in self.lights.iter_mut().zip(&mut self.light_paths) {
             *position = path.advance(*position, step, &self.world.torus, &self.swarm.positions);
+        }
+        for (light, position) in frozen {
+            self.lights[light] = position;
         }
         Ok(())
     }

@@ -292,12 +292,15 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Robots within `range` of an object or point, except the object itself.
+    /// Robots within `range` of an object or point, except the object itself. The task counts a
+    /// removed robot, but no robot senses it.
     fn neighbours(&self, of: &Value, range: f64, meter: &Rc<Meter>) -> Answer {
         meter.work(self.world.n_robots() / 4)?;
         let from = self.point(of)?;
         let torus = &self.world.torus;
+        let is_sensing = matches!(self.may, May::Sense { .. } | May::Act { .. });
         let near = (0..self.world.n_robots())
+            .filter(|&robot| !(is_sensing && self.swarm.is_removed(robot)))
             .filter(|&robot| torus.distance(from, self.swarm.positions[robot]) <= range);
         let near = near.map(|robot| thing(Kind::Robot, robot));
         let itself = |value: &Value| match (value, of) {

@@ -63,7 +63,8 @@ impl Sensor for NeighborhoodSensorConfig {
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
         let Surroundings { torus, swarm, .. } = surroundings;
         let n = self.n_neighbors as usize;
-        let others = (0..swarm.positions.len()).filter(|&robot| robot != from.robot);
+        let is_seen = |&robot: &usize| robot != from.robot && !swarm.is_removed(robot);
+        let others = (0..swarm.positions.len()).filter(is_seen);
         let mut others: Vec<(f64, usize)> = others
             .map(|robot| (torus.distance(from.position, swarm.positions[robot]), robot))
             .collect();

@@ -3,7 +3,6 @@
 use super::Trial;
 use crate::bodies::Pose;
 use crate::intervention::{Act, Intervention, Thing};
-use crate::neighbours::Neighbours;
 use crate::simulation::EvaluateError;
 use crate::swarm::Swarm;
 use crate::torus::Vec2;
@@ -15,10 +14,11 @@ pub(super) struct Watched<'a> {
     /// In the order of their steps.
     to_come: &'a [Intervention],
     /// Per robot.
-    removed: Vec<bool>,
     frozen: Vec<bool>,
     mute: Vec<bool>,
     deaf: Vec<bool>,
+    /// Lights that stay where they are.
+    lights_frozen: Vec<usize>,
     /// Lights and areas that are out.
     lights_out: Vec<usize>,
     areas_out: Vec<usize>,
@@ -30,10 +30,10 @@ impl<'a> Watched<'a> {
         let none = || vec![false; world.n_robots()];
         let watched = || Self {
             to_come: interventions,
-            removed: none(),
             frozen: none(),
             mute: none(),
             deaf: none(),
+            lights_frozen: Vec::new(),
             lights_out: Vec::new(),
             areas_out: Vec::new(),
         };
@@ -48,13 +48,6 @@ impl<'a> Watched<'a> {
         now
     }
 
-    /// Nobody senses the removed robots.
-    pub fn retain_present(&self, neighbours: &mut Neighbours) {
-        if self.removed.contains(&true) {
-            neighbours.retain(|_, neighbour| !self.removed[neighbour.robot]);
-        }
-    }
-
     /// Deaf robots have received nothing.
     pub fn deafen(&self, swarm: &mut Swarm) {
         for robot in numbers(&self.deaf) {
@@ -67,6 +60,11 @@ impl<'a> Watched<'a> {
     /// Frozen robots stand still.
     pub fn stop(&self, swarm: &mut Swarm) {
         numbers(&self.frozen).for_each(|robot| swarm.wheels[robot] = [0.0; 2]);
+    }
+
+    /// The frozen lights, each with its place: whatever moves them, they have to go back there.
+    pub fn frozen_lights(&self, lights: &[Vec2]) -> Vec<(usize, Vec2)> {
+        self.lights_frozen.iter().map(|&light| (light, lights[light])).collect()
     }
 }
 
@@ -85,14 +83,15 @@ impl Trial<'_> {
                 Act::Place(place) => self.put(thing, place, step)?,
                 Act::Remove => self.remove(thing, &mut watched),
                 Act::Freeze => match thing {
-                    Thing::Light(light) => self.light_paths[light].stop(),
+                    Thing::Light(light) => watched.lights_frozen.push(light),
                     _ => watched.frozen[thing.number()] = true,
                 },
                 Act::Mute => watched.mute[thing.number()] = true,
                 Act::Deafen => watched.deaf[thing.number()] = true,
             }
         }
-        numbers(&watched.removed).for_each(|robot| self.swarm.failed[robot] = true);
+        let Swarm { removed, failed, .. } = &mut self.swarm;
+        numbers(removed).for_each(|robot| failed[robot] = true);
         watched.lights_out.iter().for_each(|&light| self.switches.lights[light] = false);
         watched.areas_out.iter().for_each(|&area| self.switches.areas[area] = false);
         let mut silent = self.radio.silent().to_vec();
@@ -107,10 +106,8 @@ impl Trial<'_> {
     fn remove(&mut self, thing: Thing, watched: &mut Watched<'_>) {
         match thing {
             Thing::Robot(robot) => {
-                watched.removed[robot] = true;
                 watched.deaf[robot] = true;
-                // Its neighbours lose it.
-                self.swarm.moved = true;
+                self.swarm.remove(robot);
                 if let Some(interior) = &mut self.interior {
                     interior.bodies.remove(robot);
                 }

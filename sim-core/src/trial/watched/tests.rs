@@ -2,12 +2,15 @@
 
 use std::ops::Range;
 
-use experiment_file::{ExperimentConfig, ObjectConfig};
+use experiment_file::{
+    ExperimentConfig, Initializer, LightController, ObjectConfig, RobotController, ScriptConfig,
+    TaskConfig,
+};
 use serde_json::json;
 
 use crate::intervention::{Act, Intervention, Thing};
 use crate::record::StepRecord;
-use crate::testing::{experiment_a, experiment_d, genotype, robot};
+use crate::testing::{experiment_a, experiment_b, experiment_d, genotype, robot};
 use crate::torus::Vec2;
 use crate::{EvaluateError, Simulation, TrialSet};
 
@@ -24,6 +27,13 @@ fn bright() -> ExperimentConfig {
             light.params.range = 400.0;
         }
     }
+    config
+}
+
+/// The same with a script beside the built-in fitness function.
+fn with_script(mut config: ExperimentConfig, text: &str) -> ExperimentConfig {
+    let script = ScriptConfig { name: "test.star".into(), text: text.into() };
+    config.task = Some(TaskConfig { script });
     config
 }
 
@@ -143,6 +153,30 @@ fn things_go_on_from_where_they_are_put() {
 }
 
 #[test]
+fn the_border_is_that_of_the_places_where_robots_are_put() {
+    // No robot of this experiment moves by itself: a change is seen at once or never.
+    let mut config = experiment_b();
+    let square = [[0.0, 0.0], [80.0, 0.0], [80.0, 80.0], [0.0, 80.0], [41.0, 40.0]];
+    let robots = robot(&mut config);
+    robots.num_instances = 5;
+    let values = square.map(|place| place.to_vec()).to_vec();
+    robots.initializers.positions = Initializer::Fixed { values };
+    let steps = watch(
+        &config,
+        &[
+            at(STEP, Thing::Robot(4), Act::Place(Vec2::new(500.0, 500.0))),
+            at(2 * STEP, Thing::Robot(4), Act::Place(Vec2::new(39.0, 40.0))),
+        ],
+    );
+    for step in &steps {
+        let is_away = (STEP..2 * STEP).contains(&step.step);
+        let targets: Vec<_> = step.robots.iter().map(|robot| robot.target).collect();
+        let corners = [Some(true); 4];
+        assert_eq!(targets, [&corners[..], &[Some(is_away)]].concat(), "step {}", step.step);
+    }
+}
+
+#[test]
 fn a_frozen_light_stays_and_nobody_sees_a_removed_one() {
     let config = bright();
     let frozen = watch(&config, &[at(STEP, Thing::Light(0), Act::Freeze)]);
@@ -164,10 +198,7 @@ fn a_script_cannot_undo_an_intervention() {
     robot(&mut config).perturbations.leader_failure = None;
     let script =
         "def react(world):\n    for robot in world.robots:\n        robot.failed = False\n";
-    let mut file: serde_json::Value = serde_json::from_str(&config.to_canonical_json()).unwrap();
-    file["task"] = json!({"script": {"name": "undo.star", "text": script}});
-    let (config, _) =
-        ExperimentConfig::from_json(&file.to_string(), "test", evolution::ALGORITHMS).unwrap();
+    let config = with_script(config, script);
     let interventions =
         [at(STEP, Thing::Robot(1), Act::Remove), at(STEP, Thing::Robot(2), Act::Mute)];
     let steps = watch(&config, &interventions);
@@ -176,6 +207,44 @@ fn a_script_cannot_undo_an_intervention() {
         assert!(!is_heard(after(&steps), number), "robot {number}");
     }
     assert!(after(&steps).iter().all(|step| step.robots[1].wheels == [0.0; 2]));
+}
+
+#[test]
+fn a_script_does_not_move_a_frozen_light() {
+    let mut config =
+        with_script(experiment_d(), "def move(light):\n    return light.x + 1, light.y\n");
+    for object in config.world.objects.values_mut() {
+        if let ObjectConfig::LightSource(light) = object {
+            light.controller = LightController::ScriptController {};
+        }
+    }
+    let place = Vec2::new(420.0, 340.0);
+    let steps = watch(
+        &config,
+        &[at(STEP, Thing::Light(0), Act::Freeze), at(2 * STEP, Thing::Light(0), Act::Place(place))],
+    );
+    assert_ne!(steps[1].lights, steps[2].lights, "it moves");
+    let (frozen, elsewhere) = after(&steps).split_at(STEP as usize);
+    assert!(frozen.iter().all(|step| step.lights == frozen[0].lights));
+    assert!(elsewhere.iter().all(|step| step.lights == [place]));
+}
+
+#[test]
+fn a_script_senses_no_removed_robot_and_its_task_counts_it() {
+    let script = "\
+def control(robot):
+    robot.led = 1 in [other.id for other in robot.neighbours(10000)]
+def measures(world):
+    return {'others': len(world.robots[0].neighbours(10000))}
+";
+    let mut config = with_script(experiment_a(), script);
+    robot(&mut config).controller = RobotController::ScriptController;
+    let steps = watch(&config, &[at(STEP, Thing::Robot(1), Act::Remove)]);
+    let n_seeing = |step: &StepRecord| step.robots.iter().filter(|robot| robot.led > 0).count();
+    let (before, now) = steps.split_at(STEP as usize);
+    assert!(before.iter().all(|step| n_seeing(step) == 9), "all but robot 1 itself");
+    assert!(now.iter().all(|step| n_seeing(step) == 0));
+    assert!(steps.iter().all(|step| step.measures["others"] == 9.0));
 }
 
 #[test]
@@ -210,6 +279,7 @@ fn corridor() -> ExperimentConfig {
                 "near": {"n": 4, "sensor": "proximity_sensor"},
                 "light": {"n": 4, "sensor": "light_sensor"},
                 "ground": {"n": 1, "sensor": "ground_sensor"},
+                "others": {"n": 3, "sensor": "neighborhood_pos_sensor"},
             },
             "ensembles": {"OUT": {"n": 2, "activation": "tanh"}},
             "synapses": {"in": {"pre": ["near"], "post": ["OUT"]}},
@@ -232,6 +302,7 @@ fn corridor() -> ExperimentConfig {
                         "proximity_sensor": {"n_rays": 4, "range": 30},
                         "light_sensor": {"range": 400, "n_sectors": 4, "noise_variance": 0, "blocked_by": "bodies"},
                         "ground_sensor": {"color": "black"},
+                        "neighborhood_pos_sensor": {"n_neighbors": 1},
                     },
                     "actuators": {"wheel_actuator": {}},
                     "initializers": {
@@ -293,6 +364,18 @@ fn a_removed_robot_is_neither_seen_nor_in_the_way() {
     let remove = at(STEP, Thing::Robot(1), Act::Remove);
     assert_eq!(sight(&[beside]), [true, false, true], "it hides the lamp");
     assert_eq!(sight(&[beside, remove]), [false, true, true]);
+}
+
+#[test]
+fn the_nearest_robot_is_the_nearest_that_is_not_removed() {
+    let stay = [0, 1, 2].map(|robot| at(0, Thing::Robot(robot), Act::Freeze));
+    let nearest = |interventions: &[Intervention]| {
+        let steps = watch(&corridor(), &[&stay[..], interventions].concat());
+        // The stimulus after those of `sight`.
+        steps[STEP as usize].robots[0].stimuli[9..12].to_vec()
+    };
+    assert_eq!(nearest(&[]), [60.0, 30.0, 0.0]);
+    assert_eq!(nearest(&[at(STEP, Thing::Robot(1), Act::Remove)]), [180.0, 12.0, 1.0]);
 }
 
 #[test]
