@@ -3,13 +3,12 @@
 
 import { chart } from "swarm/charts.js";
 import { element } from "swarm/dom.js";
-import { askJson } from "swarm/page.js";
+import { askJson, oneByOne } from "swarm/page.js";
 
 /** A part of the page that is closed at first; `update(n_generations)`: the number of generations. */
 export function dynamicsPanel(id) {
   const rows = [];
   let n_generations = 0;
-  let isAsking = false;
   const width = chart("standard deviation of the genes by generation");
   const step = chart("step of the mean by generation");
   const agreement = chart("rank correlation of trials by generation");
@@ -36,9 +35,8 @@ export function dynamicsPanel(id) {
     node.dataset.generations = rows.length;
   };
 
-  const ask = async () => {
-    if (!node.open || isAsking) return;
-    isAsking = true;
+  // Generations that are complete before an answer need another request.
+  const ask = oneByOne(async () => {
     try {
       for (let next = rows.length ? rows.at(-1)[0] + 1 : 0; next !== null && next < n_generations && node.open;) {
         const page = await askJson(`/api/experiments/${id}/dynamics?from=${next}`);
@@ -50,8 +48,7 @@ export function dynamicsPanel(id) {
     } catch (error) {
       note.textContent = error.message;
     }
-    isAsking = false;
-  };
+  });
 
   node.update = (n) => {
     n_generations = n;

@@ -54,10 +54,11 @@ export function laboratory({ config, played, trials, simulate, place, fails, kno
     return episode;
   }
 
-  /** The episodes, one after the other, because a thread computes them. */
-  async function episodes(wanted) {
+  /** The episodes, one after the other, because a thread computes them. Once a later request has
+   *  come, the rest is left out: it would end the simulation of the later one. */
+  async function episodes(wanted, mine) {
     const found = [];
-    for (const query of wanted) found.push(await episodeOf(query));
+    for (const query of wanted) if (mine === asked) found.push(await episodeOf(query));
     return found;
   }
 
@@ -75,19 +76,21 @@ export function laboratory({ config, played, trials, simulate, place, fails, kno
     }
   }
 
-  /** Shows the changed episode, or the original with the changed one beside it. Returns the error, if
-   *  there is one. */
+  /** Shows the changed episode, or the original with the changed one beside it, unless a later request
+   *  has come. Returns the error, if it shows one. */
   async function show(query, isBeside) {
     const mine = ++asked;
     stage.setAttribute("aria-busy", "true");
     try {
       const wanted = isBeside ? [withWorld(new URLSearchParams()), query] : [query];
-      const found = await waitingFor(episodes(wanted));
-      if (mine === asked) draw(found, wanted, isBeside);
+      const found = await waitingFor(episodes(wanted, mine));
+      if (mine !== asked) return null;
+      draw(found, wanted, isBeside);
       fails(null);
       return null;
     } catch (error) {
-      if (mine === asked) fails(error);
+      if (mine !== asked) return null;
+      fails(error);
       return error;
     } finally {
       if (mine === asked) stage.removeAttribute("aria-busy");

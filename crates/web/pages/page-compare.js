@@ -54,22 +54,27 @@ async function history(id) {
 /** The group of a run. */
 const kind = (it) => [it.group || it.name, it.variant].filter(Boolean).join(" ");
 
-/** The runs of the latest answers. */
+/** Counts the selections: only the answers about the latest one are shown. */
+let asked = 0;
+/** The groups that the tables explain; empty while they wait for others. */
 let explained = "";
 
 /** Statistics of the groups, and differences between the files of runs. */
 async function explain(groups, runs) {
-  const asked = JSON.stringify(groups.map((it) => [it.name, it.runs.map((run) => run.id)]));
-  if (asked === explained) return;
-  explained = asked;
+  const mine = asked;
+  const wanted = JSON.stringify(groups.map((it) => [it.name, it.runs.map((run) => run.id)]));
+  if (wanted === explained) return;
+  explained = "";
   if (found.childElementCount === 0) found.replaceChildren(element("p", { className: "loading muted", role: "status" }, "comparing …"));
   const answers = await Promise.all([groups.length ? statistics(groups) : [], runs.length ? differences(runs) : ""]);
-  if (asked !== explained) return;
+  if (mine !== asked) return;
+  explained = wanted;
   found.replaceChildren(...answers[0]);
   files.replaceChildren(answers[1]);
 }
 
 async function show() {
+  const mine = ++asked;
   const words = new URLSearchParams({ runs: [...chosen].join(","), along: axis.value, value: column.value, as: grouping.value });
   window.history.replaceState(null, "", `?${words}`);
   try {
@@ -80,6 +85,7 @@ async function show() {
       const along = values(rows);
       return { it, points: rows.map((row, i) => [along[i], row[COLUMN[column.value]]]) };
     }));
+    if (mine !== asked) return;
     const content = { xLabel: label, yLabel: `${column.value} fitness`, lines: [], bands: [] };
     const groups = [...Map.groupBy(runs, kind)].map(([name, its]) => ({ name, runs: its }));
     if (grouping.value === "runs") {
@@ -100,8 +106,13 @@ async function show() {
     }
     picture.show(content);
     await explain(groups, runs);
-    resolve("compare");
+    if (mine === asked) resolve("compare");
   } catch (error) {
+    if (mine !== asked) return;
+    // The tables are about other runs, and the next selection asks again.
+    explained = "";
+    found.replaceChildren();
+    files.replaceChildren();
     complain(error, "compare");
   }
 }

@@ -189,9 +189,11 @@ async function drawDoing() {
 let eventsUpTo = null;
 
 async function drawEvents() {
-  if (experiment.last_sequence === eventsUpTo) return;
+  // News may come before the answer, which then lacks their events.
+  const upTo = experiment.last_sequence;
+  if (upTo === eventsUpTo) return;
   const { events } = await askJson(`/api/experiments/${id}/events`);
-  eventsUpTo = experiment.last_sequence;
+  eventsUpTo = upTo;
   eventList.replaceChildren(...events.slice(-30).reverse().map((event) =>
     element("li", {}, element("time", { className: "muted" }, new Date(event.at_ms).toLocaleString()), ` ${event.text}`)));
   if (events.length === 0) eventList.append(element("li", { className: "muted" }, "only generations"));

@@ -42,6 +42,8 @@ let local = null;
 async function localFor(words) {
   if ([...words.keys()].every((name) => name === "judged")) return null;
   local ??= askJson(`/api/individual/${where}`).then(({ played, genotype }) => localSimulation(played, new Uint8Array(Float64Array.from(genotype).buffer)));
+  // The next change asks again after a failure.
+  local.catch(() => (local = null));
   return local;
 }
 

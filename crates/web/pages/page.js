@@ -62,8 +62,8 @@ export function askDuringRun(details, path, { take, note, isDone }) {
   let n_generations = 0;
   let isAsking = false;
   let askedAt = -Infinity;
-  const request = async () => {
-    if (!details.open || details.hidden || isAsking || n_generations === 0) return;
+  const request = oneByOne(async () => {
+    if (!details.open || details.hidden || n_generations === 0) return;
     isAsking = true;
     askedAt = performance.now();
     try {
@@ -72,10 +72,11 @@ export function askDuringRun(details, path, { take, note, isDone }) {
       note.textContent = error.message;
     }
     isAsking = false;
-  };
+  });
   details.ontoggle = request;
   details.update = (n, isOver) => {
-    const isNew = n !== n_generations || (isOver && !isDone());
+    // An answer that is under way lacks what the end of a run adds.
+    const isNew = n !== n_generations || (isOver && (isAsking || !isDone()));
     n_generations = n;
     if (isNew && (isOver || performance.now() - askedAt > ASK_EVERY)) request();
   };

@@ -27,9 +27,10 @@ export function proofForm(known = null) {
     // `begin` shows a failure.
   }, () => {});
 
-  const choose = async (file) => begin(file.name, new Uint8Array(await file.arrayBuffer()));
+  const choose = (file) => begin(file.name, file.arrayBuffer().then((it) => new Uint8Array(it)));
 
-  async function begin(name, bytes) {
+  /** `content`: the bytes of the bundle, or their promise. */
+  async function begin(name, content) {
     running?.abort();
     const mine = (running = new AbortController());
     result.replaceChildren();
@@ -38,8 +39,9 @@ export function proofForm(known = null) {
     bar.removeAttribute("value");
     const started = performance.now();
     try {
-      const module = await simulator;
+      const [module, bytes] = await Promise.all([simulator, content]);
       if (!module) throw new Error(WITHOUT);
+      mine.signal.throwIfAborted();
       const generations = sample.value === "all" ? null : Number(sample.value);
       const proof = await prove(module, { file: name, bytes, generations, signal: mine.signal, onProgress });
       const seconds = (performance.now() - started) / 1000;

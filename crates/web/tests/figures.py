@@ -191,7 +191,8 @@ class Figures(BrowserTest):
             if narrow:
                 self.assertLessEqual(self.width(), NARROW, "it is too wide")
 
-    def test_points_of_a_front_are_judged_and_play(self):
+    def front_file(self):
+        """A file that evolves a front."""
         config = json.loads(CONFIG.read_text())
         config["algorithm"] |= {"name": "NSGA-II", "judgement_trials": 3, "aims": [
             {"measure": "leaders", "direction": "minimise"},
@@ -199,7 +200,22 @@ class Figures(BrowserTest):
         config["algorithm"]["populations"]["network"]["params"] = {}
         file = pathlib.Path(self.fleet.directory.name) / "front.json"
         file.write_text(json.dumps(config))
-        self.fleet.swarmctl("submit", str(file), "--generations", "6", "--watch")
+        return str(file)
+
+    def test_a_late_answer_about_a_front_is_followed_by_that_of_the_end(self):
+        fleet = Fleet()
+        self.addCleanup(fleet.stop)
+        fleet.swarmctl("submit", self.front_file(), "--generations", "40")
+        self.browser.get(fleet.pages + "/experiment/1")
+        self.wait_for_text(".standing", "Before the first generation")
+        self.hold("/front")
+        fleet.start_worker()
+        self.wait_for_text(".state", "completed")
+        self.release()
+        self.wait_for_text(".front", "judged on new trials")
+
+    def test_points_of_a_front_are_judged_and_play(self):
+        self.fleet.swarmctl("submit", self.front_file(), "--generations", "6", "--watch")
         run = max(it["id"] for it in json.loads(self.fleet.swarmctl("list")))
         told = json.loads(self.fleet.swarmctl("front", str(run)))
         shown = sorted((it for it in told["elites"] if it["shown"]), key=lambda it: it["judged"]["aims"]["leaders_mean"])
@@ -288,6 +304,53 @@ class Figures(BrowserTest):
         rows = self.script("return [...document.querySelectorAll('.differences tbody tr')].map((it) => it.lastElementChild.textContent)")
         self.assertEqual(rows, ["8"] * 3 + ["16"] * 3)
         self.picture("compare-groups")
+
+    def pair(self, group):
+        """The numbers of two new runs."""
+        first = 1 + len(json.loads(self.fleet.swarmctl("list")))
+        self.fleet.swarmctl("submit", str(CONFIG), "--generations", "2", "--group", group, "--seeds", "0..1")
+        self.fleet.swarmctl("watch", "--quiet", group)
+        return first, first + 1
+
+    def tick(self, run):
+        """Chooses a run, or no longer."""
+        self.browser.execute_script("""
+            const of = (it) => it.textContent.startsWith(`${arguments[0]} `);
+            [...document.querySelectorAll('.choices label')].find(of).querySelector('input').click();
+        """, run)
+
+    def test_a_late_answer_about_other_runs_is_not_shown(self):
+        kept, late = self.pair("late")
+        self.open(f"/compare?runs={kept}")
+        shown = lambda: [self.texts(".chart .keys .key"), self.texts(".statistics td:first-child"), self.texts(".differences td:first-child")]
+        self.find(".differences")
+        before = shown()
+        self.assertEqual(len(before[0]), 1, before)
+        self.hold(f"/api/experiments/{late}/generations")
+        self.tick(late)
+        self.tick(late)
+        self.release()
+        self.assertEqual(shown(), before)
+        # Nothing waits for its answer.
+        self.tick(late)
+        self.wait(lambda: [len(it) for it in shown()[::2]] == [2, 2], "the run is never shown")
+
+    def test_a_refused_comparison_is_named_until_another_one_succeeds(self):
+        first, second = self.pair("refused")
+        self.open(f"/compare?runs={first}")
+        self.find(".statistics")
+        self.refuse("/api/compare", "too much at once")
+        self.tick(second)
+        self.wait_for_text("#problem", "too much at once")
+        self.assertEqual(self.texts(".statistics, .differences, .loading"), [], "they are about other runs")
+        self.find("#problem button").click()
+        choose = lambda value: self.script(f"const it = document.querySelector('#along'); it.value = '{value}'; it.dispatchEvent(new Event('change'))")
+        choose("episodes")
+        self.wait_for_text("#problem", "too much at once")
+        self.refuse("/api/nothing", "")
+        choose("time")
+        self.find(".statistics")
+        self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, "#problem"), [])
 
     def test_swept_values_are_shown_beside_the_worth_of_champions(self):
         before = len(json.loads(self.fleet.swarmctl("list")))

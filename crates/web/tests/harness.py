@@ -197,6 +197,36 @@ class BrowserTest(unittest.TestCase):
     def script(self, text):
         return self.browser.execute_script(text)
 
+    def hold(self, part):
+        """Holds answers of the server back, to requests whose address has this part, until `release`."""
+        self.browser.execute_script("""
+            const [part] = arguments;
+            const held = new Promise((go) => (window.goOn = go));
+            const ask = window.fetch;
+            window.fetch = async (address, ...more) => {
+                const answer = await ask(address, ...more);
+                if (String(address).includes(part)) {
+                    window.isHeld = true;
+                    await held;
+                }
+                return answer;
+            };
+        """, part)
+
+    def release(self):
+        """Lets the held answers go, and waits until the page must have taken them."""
+        self.wait(lambda: self.script("return window.isHeld"), "no answer is held back")
+        self.browser.execute_async_script("window.goOn(); setTimeout(arguments[0], 500);")
+
+    def refuse(self, part, error):
+        """Refuses all requests whose address has this part with an error."""
+        self.browser.execute_script("""
+            const [part, error] = arguments;
+            const ask = (window.answered ??= window.fetch);
+            const refusal = () => Promise.resolve(new Response(JSON.stringify({ error }), { status: 400 }));
+            window.fetch = (address, ...more) => (String(address).includes(part) ? refusal() : ask(address, ...more));
+        """, part, error)
+
     def saved(self, selector):
         """The file that a button saves."""
         return self.browser.execute_async_script("""

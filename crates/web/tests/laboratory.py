@@ -135,6 +135,32 @@ class Server(Laboratory):
             self.browser.get(f"{self.fleet.pages}/replay/1?interventions={text}")
             self.wait_for_text("#problem", error)
 
+    def test_a_late_answer_hides_no_error_of_a_later_request(self):
+        self.open("/replay/1")
+        self.wait_for_players(1)
+        address = self.browser.current_url
+        self.hold("/api/replay/1?judged=")
+        self.find("#trial-worst").click()
+        self.wait(lambda: self.browser.current_url != address, "the trial is not chosen")
+        self.refuse("/api/replay/", "not today")
+        self.find("#trial-best").click()
+        self.wait_for_text("#problem", "not today")
+        self.release()
+        self.assertIn("not today", self.text("#problem"))
+
+    def test_an_intervention_stays_when_a_later_change_replaces_its_request(self):
+        self.open("/replay/1#step=20&robot=2")
+        # The server simulates, whose answers a test can hold back.
+        self.script("document.querySelector('link[rel=simulator]')?.remove()")
+        self.refuse("/api/replay/1?interventions", "too late")
+        self.hold("/api/replay/1?interventions")
+        self.find("#act-mute").click()
+        self.find("#what-if-robots").send_keys(Keys.BACKSPACE, "7", Keys.ENTER)
+        self.wait_for_text(".two", "7 robots")
+        self.release()
+        self.wait_for_text("#interventions", "robot 2 is mute from step 20 on")
+        self.assertIn("interventions=20%3Arobot%3A2%3Amute", self.browser.current_url)
+
     def test_the_page_is_for_everybody(self):
         for width, name in [(NARROW, "narrow"), (1280, "middle"), (2560, "wide")]:
             self.browser.set_window_size(width, 1400)

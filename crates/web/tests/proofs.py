@@ -119,6 +119,24 @@ class Proofs(BrowserTest):
         self.choose(other)
         self.assertIn("it is not a bundle", self.finish())
 
+    def test_a_file_that_is_read_late_replaces_no_later_choice(self):
+        other = self.directory / "late.zip"
+        other.write_text("no archive")
+        self.browser.get(self.page.as_uri())
+        self.browser.set_script_timeout(20)
+        self.script("""
+            const read = File.prototype.arrayBuffer;
+            File.prototype.arrayBuffer = function () {
+                return new Promise((done) => (window.goOn = () => done(read.call(this))));
+            };
+        """)
+        self.choose(other)
+        self.wait(lambda: self.script("return Boolean(window.goOn)"), "nobody reads the file")
+        self.find("#start").click()
+        self.finish()
+        self.browser.execute_async_script("window.goOn(); setTimeout(arguments[0], 500);")
+        self.assertEqual(self.lines(), self.proof)
+
     def test_a_proof_can_be_cancelled(self):
         self.browser.get(self.page.as_uri())
         self.script("document.querySelector('#sample').value = 'all'")
