@@ -234,12 +234,14 @@ fn stop_on_signals(shutdown: CancellationToken, give_up: CancellationToken) -> i
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     tokio::spawn(async move {
+        // A worker near the end of its time limit finishes its items without a signal.
+        let mut is_signalled = false;
         loop {
             tokio::select! {
                 _ = terminate.recv() => {}
                 _ = interrupt.recv() => {}
             }
-            if shutdown.is_cancelled() {
+            if std::mem::replace(&mut is_signalled, true) {
                 std::process::exit(EXIT_INTERRUPTED);
             }
             shutdown.cancel();
