@@ -10,9 +10,11 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use super::CheckpointError;
 
-/// Most lists, options and integers in a value: more than in a state of evolution with forty
-/// populations and the largest number of individuals.
+/// Most lists, options and integers in a short value.
 const SMALL_MAX: usize = 4 << 20;
+/// Least bytes for each list, option and integer of a longer value: most lists of a state hold a
+/// number of eight bytes or more.
+const BYTES_PER_SMALL: usize = 8;
 
 /// Encodes a value in this version of its format.
 pub(crate) fn encode(version: u8, value: &impl Serialize) -> Vec<u8> {
@@ -24,7 +26,12 @@ pub(crate) fn decode<T: DeserializeOwned>(
     supported: u8,
     bytes: &[u8],
 ) -> Result<T, CheckpointError> {
-    decode_at_most(SMALL_MAX, supported, bytes)
+    decode_at_most(small_max(bytes.len()), supported, bytes)
+}
+
+/// Most lists, options and integers in a value of this many bytes.
+fn small_max(n_bytes: usize) -> usize {
+    SMALL_MAX.max(n_bytes / BYTES_PER_SMALL)
 }
 
 fn decode_at_most<T: DeserializeOwned>(
@@ -101,6 +108,9 @@ mod tests {
         // The length of the whole list counts as a number, too.
         assert_eq!(read(8, &lists(7, 1000)).unwrap().len(), 7);
         assert!(matches!(read(8, &lists(8, 0)), Err(CheckpointError::Malformed(_))));
+        // As many individuals and populations as experiments may have.
+        let n_genes = 50_000_000;
+        assert!(small_max(n_genes * (1 + size_of::<f64>())) > n_genes);
         let hostile = encode(1, &vec![Vec::<f64>::new(); SMALL_MAX]);
         assert!(decode::<Vec<Vec<f64>>>(1, &hostile).is_err());
     }
