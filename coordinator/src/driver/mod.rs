@@ -295,7 +295,7 @@ impl Driver {
         let now = clock::engine_now();
         match command {
             Command::StartJob { job, name, spec, priority, is_paused } => {
-                self.engine.on_job_started(job, name, spec, priority);
+                self.engine.on_job_started(now, job, name, spec, priority);
                 if is_paused {
                     self.engine.on_job_paused(now, job);
                 }

@@ -203,7 +203,7 @@ fn throughput() -> f64 {
             },
         );
     }
-    engine.on_job_started(EXPERIMENT, "name".into(), "spec".into(), Priority::default());
+    engine.on_job_started(now, EXPERIMENT, "name".into(), "spec".into(), Priority::default());
     let genotypes = population(100_000);
     let started = Instant::now();
     let batch = Batch::fitness(TrialSet::Generation(0), genotypes, 1);

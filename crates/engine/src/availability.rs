@@ -37,8 +37,9 @@ pub struct Obstacles {
     pub question: Option<QuestionId>,
     /// Until when it rests.
     pub resting_until: Option<Instant>,
-    /// Whether it is on probation.
-    pub is_on_probation: bool,
+    /// Number of losses of workers of its name since the last result; after a loss, it is on
+    /// probation.
+    pub n_losses: u32,
 }
 
 impl Obstacles {
@@ -50,7 +51,7 @@ impl Obstacles {
             Self { is_stalled: true, .. } => Availability::Stalled,
             Self { question: Some(_), .. } => Availability::Doubted,
             Self { resting_until: Some(until), .. } => Availability::Resting(*until),
-            Self { is_on_probation: true, .. } => Availability::OnProbation,
+            Self { n_losses: 1.., .. } => Availability::OnProbation,
             _ => Availability::Free,
         }
     }
@@ -62,8 +63,8 @@ impl Availability<'_> {
         matches!(self, Self::Free | Self::OnProbation)
     }
 
-    /// Whether audits wait for the worker: it may get items now, or soon.
-    pub fn may_audit(self) -> bool {
+    /// Whether the worker may get items now, or soon.
+    pub fn is_usable_soon(self) -> bool {
         self.is_usable() || matches!(self, Self::Doubted | Self::Resting(_))
     }
 

@@ -374,7 +374,7 @@ impl BatchInProgress {
     ) -> EvaluatedBatch {
         EvaluatedBatch {
             trial_set: self.request.trial_set,
-            n_unaudited: self.audits.n_waiting(),
+            n_unaudited: self.audits.n_missing(),
             n_audited: self.audits.n_agreed(),
             values: self.known.into_values(),
             duration: now.saturating_duration_since(self.started),

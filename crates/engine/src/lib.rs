@@ -181,7 +181,7 @@ impl Engine {
         let mut worker = Worker::new(introduction, now);
         worker.obstacles = Obstacles {
             quarantined,
-            is_on_probation: rest.is_some(),
+            n_losses: self.trust.crash_loops.n_losses(&worker.introduction.name),
             resting_until: rest.filter(|&until| until > now && self.has_usable_worker()),
             ..Obstacles::default()
         };
@@ -245,11 +245,17 @@ impl Engine {
     /// which all its items share.
     pub fn on_job_started(
         &mut self,
+        now: Instant,
         id: JobId,
         name: Arc<str>,
         spec: Arc<str>,
         priority: Priority,
     ) {
+        // The end of its former run may not be reported. Without an end, the ready queue and the
+        // workers would keep items that the new job does not have.
+        if self.jobs.contains_key(&id) {
+            self.on_job_ended(now, id);
+        }
         self.jobs.insert(id, JobWork::new(name, spec, priority));
     }
 
@@ -375,8 +381,9 @@ impl Engine {
         let process = worker.introduction.process;
         let is_alone = n_computing + worker.written_off.len() == 1;
         let loss = WorkerLoss { process, is_alone };
-        if is_evidence {
-            for assignment in worker.written_off.into_values() {
+        for assignment in worker.written_off.into_values() {
+            self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
+            if is_evidence {
                 self.on_written_off_lost(now, &assignment, loss);
             }
         }
@@ -413,6 +420,7 @@ impl Engine {
     /// Takes a job's items back from all workers, and queues them.
     fn withdraw(&mut self, now: Instant, id: JobId) {
         let mut audits = Vec::new();
+        let mut charged = Duration::ZERO;
         for (&worker_id, worker) in &mut self.workers {
             worker.recalled.retain(|(_, assignment)| assignment.job != id);
             if worker.known_jobs.remove(&id).is_some() {
@@ -422,6 +430,7 @@ impl Engine {
                 let written_off = worker.written_off.extract_if(.., is_ours).collect::<Vec<_>>();
                 for (_, item) in ours.iter().chain(&written_off).cloned() {
                     let who = (worker_id, &*worker);
+                    charged += item.charge;
                     self.timeline.add(now, who, item, Fate::TakenBack, Duration::ZERO);
                 }
                 audits.extend(ours.into_iter().filter(|(_, a)| a.is_audit()).map(|(_, a)| a.item));
@@ -431,6 +440,7 @@ impl Engine {
                 self.commands.push_back(Command::Send(worker_id, ToWorker::End(id)));
             }
         }
+        self.correct_charge(id, charged, Duration::ZERO);
         if let Some(batch) = self.batch_mut(id) {
             batch.requeue_all();
             audits.iter().for_each(|item| batch.push_audit(item));

@@ -125,7 +125,9 @@ impl Engine {
         }
         worker.last_result = Some(now);
         worker.obstacles.is_stalled = false;
-        worker.obstacles.is_on_probation &= !is_ok;
+        if is_ok {
+            worker.obstacles.n_losses = 0;
+        }
         self.load_index.add(id, worker);
         let fate = if is_ok { Fate::Computed } else { Fate::Failed };
         self.timeline.add(now, (id, worker), assignment.clone(), fate, busy);
@@ -236,14 +238,13 @@ impl Engine {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = work.batch.as_ref().filter(|_| !work.is_paused) else { return };
         let is_in_grace = self.trust.awaits_auditor(now);
-        let (workers, job) = (&self.workers, &*work);
+        let (workers, trust, job) = (&self.workers, &self.trust, &*work);
         let has_auditor = |batch: &BatchInProgress| {
             // In a fleet that is divided among experiments, the auditors seen last may not take
             // this one.
             let is_awaited = is_in_grace && workers.values().all(|worker| worker.takes(job));
-            let mut auditors = workers
-                .values()
-                .filter(|worker| worker.availability().may_audit() && worker.takes(job));
+            let mut auditors =
+                workers.values().filter(|worker| trust.may_audit(worker) && worker.takes(job));
             is_awaited || auditors.any(|worker| batch.audits.has_for(worker.name()))
         };
         if !batch.is_finished(has_auditor) {
@@ -274,17 +275,17 @@ impl Engine {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = &mut work.batch else { return };
         self.counters.n_items_requeued += 1;
-        if kind == ItemKind::Audit {
-            // The lost worker may have been the only possible auditor.
-            batch.push_audit(&item);
-            self.update_readiness(id);
-            return;
-        }
         let next = match why {
             NoResult::TakenBack => AfterLoss::Retry,
             NoResult::WorkerLost(loss) => batch.losses.add(now, &item, loss),
         };
         match next {
+            // Its values are known, so nothing but the audit is lost.
+            AfterLoss::Ask if kind == ItemKind::Audit => batch.audits.waive(),
+            _ if kind == ItemKind::Audit => {
+                batch.push_audit(&item);
+                self.update_readiness(id);
+            }
             AfterLoss::Wait(until) => batch.delay(item, until),
             AfterLoss::Ask if self.may_ask_about_losses(id, &item) => {
                 self.ask_referee(id, item, Doubt::Losses);

@@ -233,8 +233,9 @@ impl Run {
             n_processes: 0,
             over_at: None,
         };
-        run.fleet.tell(|engine, _| {
-            engine.on_job_started(JOB, "quickstart".into(), EXPERIMENT.into(), Priority::default());
+        run.fleet.tell(|engine, now| {
+            let (name, priority) = ("quickstart".into(), Priority::default());
+            engine.on_job_started(now, JOB, name, EXPERIMENT.into(), priority);
         });
         for machine in &mut run.machines {
             machine.treat(&mut run.fleet, Health::Healthy, &mut run.n_processes);

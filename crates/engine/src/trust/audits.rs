@@ -19,6 +19,8 @@ pub struct Audits {
     /// Audits that workers compute.
     pub in_flight: BTreeSet<AssignmentId>,
     n_agreed: usize,
+    /// Audits that were given up, because workers were lost with them.
+    n_waived: usize,
     /// Workers that an audit agreed with.
     confirmed: BTreeSet<Arc<str>>,
 }
@@ -37,6 +39,16 @@ impl Audits {
     /// Number of audits that wait for a worker.
     pub fn n_waiting(&self) -> usize {
         self.waiting.values().map(VecDeque::len).sum()
+    }
+
+    /// Gives up an audit.
+    pub fn waive(&mut self) {
+        self.n_waived += 1;
+    }
+
+    /// Number of audits without a result.
+    pub fn n_missing(&self) -> usize {
+        self.n_waiting() + self.n_waived
     }
 
     /// Whether an audit waits that a worker of this name may do.

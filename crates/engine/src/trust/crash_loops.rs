@@ -47,9 +47,14 @@ impl CrashLoops {
     /// A worker has returned a result.
     pub fn on_result(&mut self, worker: &Worker) {
         // Checks the flag first, because this runs for every result and few workers have an entry.
-        if worker.obstacles.is_on_probation {
+        if worker.obstacles.n_losses > 0 {
             self.by_name.remove(&**worker.name());
         }
+    }
+
+    /// Number of losses of workers of this name since the last result.
+    pub fn n_losses(&self, name: &str) -> u32 {
+        self.by_name.get(name).map_or(0, |crash_loop| crash_loop.n_losses)
     }
 
     /// When a joining worker may get an item, if it was lost before.

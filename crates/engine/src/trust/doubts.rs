@@ -61,7 +61,8 @@ impl Engine {
             return self.put_in_quarantine(now, &second, &reason);
         };
         // Their other results are compared after the verdict, except late and recalled ones.
-        if self.is_doubted(first.id) || self.is_doubted(second.id) {
+        let doubted = self.trust.questions.doubted();
+        if doubted.contains(&*first.name) || doubted.contains(&*second.name) {
             return;
         }
         let parties = [(first, first_values), (second, second_values)];

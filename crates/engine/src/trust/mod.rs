@@ -30,7 +30,8 @@ mod verdicts;
 use std::time::Duration;
 
 use super::{
-    Engine, batch::BatchInProgress, in_flight::ItemKind, item::Item, job::JobWork, worker::Worker,
+    Engine, availability::Obstacles, batch::BatchInProgress, in_flight::ItemKind, item::Item,
+    job::JobWork, worker::Worker,
 };
 use model::ids::{JobId, WorkerId};
 
@@ -41,6 +42,9 @@ use self::{crash_loops::CrashLoops, quarantine::Quarantine, questions::Questions
 /// Time that an audit waits for a second worker to connect or reconnect. Without this wait, a lying
 /// worker could escape audits by being the first to connect after the coordinator's start.
 const AUDITOR_GRACE: Duration = Duration::from_secs(30);
+
+/// Number of losses without a result after which audits no longer wait for a worker.
+const CRASH_LOOP: u32 = 3;
 
 /// The state of everything that concerns the workers' reliability.
 #[derive(Debug)]
@@ -64,6 +68,16 @@ impl Trust {
             crash_loops: CrashLoops::default(),
             auditors_seen: now,
         }
+    }
+
+    /// Whether audits wait for a worker. They do not wait for one that is lost again and again
+    /// without a result, nor for one in doubt while the referee cannot answer: neither may ever get
+    /// an audit.
+    pub fn may_audit(&self, worker: &Worker) -> bool {
+        let Obstacles { n_losses, question, .. } = &worker.obstacles;
+        worker.availability().is_usable_soon()
+            && *n_losses < CRASH_LOOP
+            && question.is_none_or(|id| self.questions.is_answerable(id))
     }
 
     /// Whether audits still wait for a second worker to connect.
@@ -104,7 +118,7 @@ impl Engine {
 
     /// Updates the last time at which two workers could audit each other.
     pub(super) fn note_auditors(&mut self, now: Instant) {
-        let mut auditors = self.workers.values().filter(|worker| worker.availability().may_audit());
+        let mut auditors = self.workers.values().filter(|worker| self.trust.may_audit(worker));
         let first = auditors.next().map(Worker::name);
         if auditors.any(|worker| Some(worker.name()) != first) {
             self.trust.auditors_seen = now;

@@ -226,9 +226,19 @@ impl Questions {
         self.about(job).filter(|(_, question)| is_reason(&question.doubt)).count()
     }
 
-    /// The names of the workers with a result in doubt.
+    /// The names of the workers with a result in doubt. A reported failure that the referee cannot
+    /// check puts no result in doubt.
     pub fn doubted(&self) -> BTreeSet<&str> {
-        self.open.values().flat_map(Question::parties).map(|party| &*party.name).collect()
+        let is_moot = |question: &&Question| {
+            question.trouble.is_some() && matches!(question.doubt, Doubt::Failure { .. })
+        };
+        let questions = self.open.values().filter(|question| !is_moot(question));
+        questions.flat_map(Question::parties).map(|party| &*party.name).collect()
+    }
+
+    /// Whether the referee may soon answer a question.
+    pub fn is_answerable(&self, id: QuestionId) -> bool {
+        self.open.get(&id).is_none_or(|question| question.trouble.is_none())
     }
 
     /// Number of questions since the engine began.

@@ -135,6 +135,25 @@ fn results_of_unknown_items_and_of_ended_experiments_are_ignored() {
 }
 
 #[test]
+fn a_job_that_starts_again_begins_anew_and_leaves_nothing_behind_at_its_end() {
+    let mut fleet = plain_fleet();
+    let worker = fleet.join_by_hand(1);
+    start(&mut fleet, EXPERIMENT, 10, 1);
+    assert!(!fleet.assigned(worker).is_empty());
+    fleet.submit(EXPERIMENT, 100);
+    assert!(fleet.assigned(worker).is_empty(), "the former items are taken back");
+    fleet.ask(EXPERIMENT, 0, 10, 1);
+    fleet.run_by_hand();
+    assert_evaluated(&fleet, 10, 1);
+
+    fleet.ask(EXPERIMENT, 1, 10, 1);
+    fleet.submit(EXPERIMENT, 100);
+    fleet.tell(|engine, now| engine.on_job_ended(now, EXPERIMENT));
+    let other = fleet.join_by_hand(1);
+    assert!([worker, other].into_iter().all(|id| fleet.assigned(id).is_empty()));
+}
+
+#[test]
 fn a_result_that_comes_twice_counts_once() {
     let mut fleet = fleet();
     let id = fleet.join_by_hand(1);

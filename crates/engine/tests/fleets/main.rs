@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod auditors;
 mod by_hand;
 mod divided;
 mod evaluations;
@@ -248,6 +249,31 @@ fn a_paused_experiment_gives_its_workers_up_and_goes_on_where_it_was() {
     fleet.tell(|engine, now| engine.on_job_resumed(now, EXPERIMENT));
     assert!(fleet.run_until(HOUR, is_finished));
     assert_right(&fleet, 40, 5);
+}
+
+#[test]
+fn a_pause_costs_an_experiment_no_share_of_the_fleet() {
+    let mut fleet = fleet();
+    let worker = fleet.join_by_hand(10);
+    let other = JobId::Experiment(ExperimentId(2));
+    for job in [EXPERIMENT, other] {
+        fleet.submit(job, 100);
+        fleet.ask(job, 0, 1000, 1);
+    }
+    let step = |fleet: &mut SimulatedFleet| {
+        fleet.run_for(SECOND);
+        fleet.step(worker);
+    };
+    for _ in 0..20 {
+        (0..10).for_each(|_| step(&mut fleet));
+        fleet.tell(|engine, now| engine.on_job_paused(now, EXPERIMENT));
+        fleet.tell(|engine, now| engine.on_job_resumed(now, EXPERIMENT));
+    }
+    let before = fleet.timeline().len();
+    (0..100).for_each(|_| step(&mut fleet));
+    let jobs = fleet.timeline().into_iter().skip(before).map(|entry| entry.job);
+    let n_ours = jobs.filter(|&job| job == EXPERIMENT).count();
+    assert!((40..=60).contains(&n_ours), "{n_ours} of 100 items");
 }
 
 #[test]

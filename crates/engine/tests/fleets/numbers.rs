@@ -112,7 +112,7 @@ impl Ask for SimulatedFleet {
     fn submit(&mut self, id: JobId, weight: u32) {
         let priority = Priority::new(weight).expect("within bounds");
         let name = id.to_string().replace(' ', "-").into();
-        self.tell(|engine, _| engine.on_job_started(id, name, "spec".into(), priority));
+        self.tell(|engine, now| engine.on_job_started(now, id, name, "spec".into(), priority));
     }
 
     fn ask(&mut self, id: JobId, generation: u64, population_size: usize, n_trials: u32) {
