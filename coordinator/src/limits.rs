@@ -89,10 +89,9 @@ pub const EVALUATIONS_MAX: usize = 16;
 /// largest evaluations, or thousands of usual ones.
 pub const REQUESTS_LEN_MAX: usize = 256 << 20;
 /// Number of experiment files in checks at the same time; more wait. A check compiles the
-/// experiment; a large one takes a processor and tens of megabytes.
+/// experiment; a large one takes a processor and tens of megabytes. So does the generation after
+/// which a fork continues, which is read only for the check.
 pub const CHECKS_MAX: usize = 4;
-/// Most numbers of an evaluation, 16 MiB: trials x steps x measures of the task.
-pub const EVALUATION_VALUES_MAX: usize = 1 << 21;
 /// Most numbers of one trial, 2 MiB, because a trial travels in one message.
 pub const TRIAL_VALUES_MAX: usize = 1 << 18;
 /// Pause between two messages of news.

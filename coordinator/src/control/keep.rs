@@ -3,6 +3,7 @@
 use crate::{
     ids::ExperimentId,
     labels::{self, Labels},
+    queries,
     store::ExperimentRecord,
 };
 
@@ -37,11 +38,14 @@ impl Control {
         set: Labels,
         remove: Vec<String>,
     ) -> Result<ExperimentRecord, ControlError> {
-        let mut labels = self.find(id).await?.labels;
-        labels.retain(|key, _| !remove.contains(key));
-        labels.extend(set);
-        labels::check(&labels).map_err(ControlError::Invalid)?;
-        self.store.try_write(move |store| store.set_labels(id, &labels)).await?;
+        self.check_and_write(move |store| {
+            let mut labels = queries::experiment(store, id)?.record.labels;
+            labels.retain(|key, _| !remove.contains(key));
+            labels.extend(set);
+            labels::check(&labels).map_err(ControlError::Invalid)?;
+            Ok(store.set_labels(id, &labels)?)
+        })
+        .await?;
         self.find(id).await
     }
 

@@ -39,7 +39,7 @@ use crate::{
     memory::Shortage,
     queries::{self, QueryError},
     shared_store::SharedStore,
-    store::{ExperimentRecord, StoreError},
+    store::{ExperimentRecord, Store, StoreError},
 };
 
 use experiment_files::ExperimentFiles;
@@ -201,6 +201,19 @@ impl Control {
 
     async fn find(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
         Ok(self.store.read(move |store| queries::experiment(store, id)).await?.record)
+    }
+
+    /// Checks and writes as one operation, so that nothing changes in between.
+    async fn check_and_write<T: Send + 'static>(
+        &self,
+        operation: impl FnOnce(&mut Store) -> Result<T, ControlError> + Send + 'static,
+    ) -> Result<T, ControlError> {
+        let operation = move |store: &mut Store| match operation(store) {
+            // Only failures of the database are trouble of the shared store.
+            Err(ControlError::Query(QueryError::Store(error))) => Err(error),
+            other => Ok(other),
+        };
+        self.store.try_write(operation).await?
     }
 }
 

@@ -36,32 +36,42 @@ impl Control {
         self.find(id).await?;
         // Wait until the experiment's end is stored.
         self.request(id, Request::Settle).await?;
-        let (store, events) = (self.store.clone(), self.events.clone());
-        let memory_budget = self.memory_budget;
+        let control = self.clone();
         // In a task of its own: the driver must hear of a stored change even if the client goes
         // away meanwhile.
-        let reopening = tokio::spawn(async move {
-            let runnable =
-                store.try_write(move |store| Ok(prepare(store, id, reopening, memory_budget)));
-            let runnable = runnable.await??;
-            info!(experiment = %id, name = runnable.config.name, "experiment goes on");
-            let ready = DriverEvent::ExperimentReady(Box::new(runnable));
-            events.send(ready).await.map_err(|_| ControlError::ShuttingDown)
-        });
+        let reopening = tokio::spawn(async move { control.run_again(id, reopening).await });
         reopening.await.map_err(|_| ControlError::Panicked("continuing the experiment"))??;
         self.find(id).await
     }
+
+    /// Stores that an ended experiment continues, and hands it to the driver.
+    async fn run_again(&self, id: ExperimentId, reopening: Reopening) -> Result<(), ControlError> {
+        let control = self.clone();
+        let prepared = self.check_and_write(move |store| {
+            let runnable = prepare(store, id, reopening, control.memory_budget)?;
+            // Within the operation: whoever reads that it runs must not take it up as well.
+            if runnable.is_some() {
+                control.forget_waiting(id);
+            }
+            Ok(runnable)
+        });
+        let Some(runnable) = prepared.await? else { return Ok(()) };
+        info!(experiment = %id, name = runnable.config.name, "experiment goes on");
+        let ready = DriverEvent::ExperimentReady(Box::new(runnable));
+        self.events.send(ready).await.map_err(|_| ControlError::ShuttingDown)
+    }
 }
 
-/// Checks that an experiment can continue, and stores that it does.
+/// Checks that an experiment can continue, and stores that it does. `None` if another client has
+/// resumed it already.
 fn prepare(
     store: &mut Store,
     id: ExperimentId,
     reopening: Reopening,
     memory_budget: u64,
-) -> Result<Runnable, ControlError> {
+) -> Result<Option<Runnable>, ControlError> {
     let experiment = queries::experiment(store, id)?;
-    let config_json = config_of(&experiment, reopening)?;
+    let Some(config_json) = config_of(&experiment, reopening)? else { return Ok(None) };
     if let Some(incompatible) = queries::incompatibility(&experiment) {
         return Err(ControlError::NotNow(format!(
             "experiment {id} cannot continue: {incompatible}"
@@ -76,21 +86,25 @@ fn prepare(
         Reopening::Resume => "resumed".to_owned(),
     };
     store.reopen(id, experiment.state, &config_json, &why, clock::unix_ms())?;
-    Ok(runnable)
+    Ok(Some(runnable))
 }
 
-/// The configuration with which an experiment continues, or why it cannot.
-fn config_of(experiment: &StoredExperiment, reopening: Reopening) -> Result<String, ControlError> {
+/// The configuration with which an experiment continues, or why it cannot. `None` if another
+/// client has resumed it since this one found it ended.
+fn config_of(
+    experiment: &StoredExperiment,
+    reopening: Reopening,
+) -> Result<Option<String>, ControlError> {
     use ExperimentState::{Cancelled, Completed, Failed, Paused, Running};
     let (ExperimentRecord { id, state, .. }, config_json) =
         (&experiment.record, &experiment.config_json);
     let not_now = |what: String| Err(ControlError::NotNow(format!("experiment {id} {what}")));
     match (reopening, state) {
         (Reopening::Retry, Failed) | (Reopening::Resume, Cancelled | Failed) => {
-            Ok(config_json.clone())
+            Ok(Some(config_json.clone()))
         }
         (Reopening::Extend(generations), Completed) if experiment.can_be_continued() => {
-            longer(experiment, generations)
+            longer(experiment, generations).map(Some)
         }
         (Reopening::Extend(_), Completed) => not_now(format!(
             "has completed before its last generation: {}; continue from there with another \
@@ -108,7 +122,7 @@ fn config_of(experiment: &StoredExperiment, reopening: Reopening) -> Result<Stri
         (_, Completed) => not_now(format!(
             "has completed; continue it with: swarmctl resume {id} --generations N"
         )),
-        (Reopening::Resume, Running) => Ok(config_json.clone()),
+        (Reopening::Resume, Running) => Ok(None),
     }
 }
 

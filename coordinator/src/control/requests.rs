@@ -14,7 +14,7 @@ use crate::{
 
 use super::{
     ControlError,
-    turns::{Client, Turns},
+    turns::{Client, Turn, Turns},
 };
 
 /// Bytes that a request takes beside its content; a budget does not count less.
@@ -47,25 +47,46 @@ impl Requests {
         room.map(|room| RequestPlace { _room: room }).ok_or(ControlError::TooManyRequests)
     }
 
-    /// Runs a check on a thread of its own, because it is CPU-bound and takes memory. Few checks
-    /// run at the same time, and clients take turns. The check calls its argument to learn
-    /// whether to continue: false if the check has taken too long, if nobody waits for its
-    /// answer, or if the coordinator stops.
+    /// Waits for a turn to check. Few requests have one at the same time, and clients take turns.
+    pub(super) async fn turn(&self, client: Client) -> Turn {
+        self.checks.wait(client).await
+    }
+
+    /// Waits for a turn, and runs a check as [`check_in`](Self::check_in) does.
     pub async fn check<T: Send + 'static>(
         &self,
         client: Client,
         check: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
     ) -> Result<T, ControlError> {
-        self.check_within(TRYING_TIME_MAX, client, check).await
+        self.check_in(self.turn(client).await, check).await
+    }
+
+    /// Runs a check on a thread of its own, because it is CPU-bound and takes memory. The check
+    /// calls its argument to learn whether to continue: false if the check has taken too long, if
+    /// nobody waits for its answer, or if the coordinator stops.
+    pub(super) async fn check_in<T: Send + 'static>(
+        &self,
+        turn: Turn,
+        check: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
+    ) -> Result<T, ControlError> {
+        self.check_within(TRYING_TIME_MAX, turn, check).await
+    }
+
+    /// As [`check`](Self::check), for a check that may take as long as it needs.
+    pub async fn check_at_length<T: Send + 'static>(
+        &self,
+        client: Client,
+        check: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
+    ) -> Result<T, ControlError> {
+        self.check_within(Duration::MAX, self.turn(client).await, check).await
     }
 
     async fn check_within<T: Send + 'static>(
         &self,
         time: Duration,
-        client: Client,
+        turn: Turn,
         check: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
     ) -> Result<T, ControlError> {
-        let turn = self.checks.wait(client).await;
         // Cancelled when the coordinator stops, and when the client goes away.
         let end = self.shutdown.child_token();
         let ended_in_time = end.clone().drop_guard();
@@ -128,7 +149,7 @@ mod tests {
         assert!((&mut busy).now_or_never().is_none());
         let mut others = Vec::new();
         for _ in 1..CHECKS_MAX {
-            others.push(requests.checks.wait(Client::default()).await);
+            others.push(requests.turn(Client::default()).await);
         }
         let mut next = Box::pin(requests.check(Client::default(), |_| ()));
         assert!((&mut next).now_or_never().is_none(), "there is no turn left");
@@ -140,7 +161,8 @@ mod tests {
     #[tokio::test]
     async fn a_check_is_told_to_end_when_it_takes_long() {
         let requests = requests();
-        let ended = requests.check_within(Duration::ZERO, Client::default(), endless).await;
+        let turn = requests.turn(Client::default()).await;
+        let ended = requests.check_within(Duration::ZERO, turn, endless).await;
         assert_eq!(ended.unwrap(), "was ended");
     }
 
@@ -148,7 +170,7 @@ mod tests {
     async fn a_check_is_told_to_end_when_the_coordinator_stops() {
         let requests = requests();
         requests.shutdown.cancel();
-        let ended = requests.check_within(Duration::MAX, Client::default(), endless).await;
+        let ended = requests.check_at_length(Client::default(), endless).await;
         assert_eq!(ended.unwrap(), "was ended");
     }
 
@@ -157,7 +179,7 @@ mod tests {
         let requests = requests();
         let (say, said) = mpsc::channel();
         let check = move |goes_on: &dyn Fn() -> bool| say.send(endless(goes_on));
-        let mut checking = Box::pin(requests.check_within(Duration::MAX, Client::default(), check));
+        let mut checking = Box::pin(requests.check_at_length(Client::default(), check));
         assert!((&mut checking).now_or_never().is_none());
         drop(checking);
         let ended = task::spawn_blocking(move || said.recv()).await.unwrap();

@@ -1,6 +1,9 @@
 //! Continues unfinished experiments when the coordinator starts.
 
-use std::sync::PoisonError;
+use std::{
+    collections::BTreeSet,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
 
 use tracing::{error, warn};
 
@@ -38,48 +41,66 @@ impl Control {
     pub async fn leave_unfinished(&self) -> Result<(), StoreError> {
         let unfinished = Filter::unfinished();
         let unfinished = self.store.read(move |store| store.experiments(&unfinished)).await?;
-        let mut left = self.left_alone.lock().unwrap_or_else(PoisonError::into_inner);
-        left.extend(unfinished.into_iter().map(|experiment| experiment.id));
+        lock(&self.left_alone).extend(unfinished.into_iter().map(|experiment| experiment.id));
         Ok(())
     }
 
     /// Hands an experiment that was left alone to the driver; pauses a damaged one.
     pub async fn take_up_if_left(&self, id: ExperimentId) -> Result<(), ControlError> {
-        // Of two concurrent requests, one starts it.
-        if !self.left_alone.lock().unwrap_or_else(PoisonError::into_inner).remove(&id) {
-            return Ok(());
+        match self.take_up_from(&self.left_alone, id).await {
+            Err(unsound @ StoreError::Unsound { .. }) => Ok(self.set_aside(id, &unsound).await?),
+            other => Ok(other?),
         }
-        match self.restore(id).await {
-            Ok(Some(runnable)) => self.start(runnable).await,
-            Ok(None) => {}
-            Err(unsound @ StoreError::Unsound { .. }) => self.set_aside(id, &unsound).await?,
-            Err(error) => return Err(error.into()),
-        }
-        Ok(())
     }
 
     /// Hands an experiment that was set aside to the driver, if the damage is gone.
     pub async fn take_up(&self, id: ExperimentId) -> Result<(), ControlError> {
-        if !self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).contains(&id) {
+        Ok(self.take_up_from(&self.set_aside, id).await?)
+    }
+
+    /// Hands an experiment that waits to the driver. It waits on if it cannot be restored, or if
+    /// the client goes away before.
+    async fn take_up_from(
+        &self,
+        waiting: &Mutex<BTreeSet<ExperimentId>>,
+        id: ExperimentId,
+    ) -> Result<(), StoreError> {
+        if !lock(waiting).contains(&id) {
             return Ok(());
         }
         let restored = self.restore(id).await?;
         // Of two concurrent requests, one starts it.
-        let is_first = self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        let is_first = lock(waiting).remove(&id);
         if let (true, Some(runnable)) = (is_first, restored) {
             self.start(runnable).await;
         }
         Ok(())
     }
 
-    async fn start(&self, runnable: Runnable) {
-        // The driver runs for as long as the coordinator does.
-        let _ = self.events.send(DriverEvent::ExperimentReady(Box::new(runnable))).await;
+    /// An experiment no longer waits to be taken up.
+    pub(super) fn forget_waiting(&self, id: ExperimentId) {
+        for waiting in [&self.left_alone, &self.set_aside] {
+            lock(waiting).remove(&id);
+        }
     }
 
-    /// The stored experiment; none if it needs another version of this program.
+    async fn start(&self, runnable: Runnable) {
+        let events = self.events.clone();
+        // In a task of its own: an experiment that no longer waits must start even if the client
+        // goes away meanwhile.
+        let starting = tokio::spawn(async move {
+            // The driver runs for as long as the coordinator does.
+            let _ = events.send(DriverEvent::ExperimentReady(Box::new(runnable))).await;
+        });
+        let _ = starting.await;
+    }
+
+    /// The stored experiment; none if it has ended, or needs another version of this program.
     async fn restore(&self, id: ExperimentId) -> Result<Option<Runnable>, StoreError> {
         let (experiment, checkpoint) = self.store.read(move |store| store.resumable(id)).await?;
+        if !experiment.state.is_unfinished() {
+            return Ok(None);
+        }
         if experiment.fingerprint != sim_core::FINGERPRINT {
             warn!(
                 experiment = %id,
@@ -102,8 +123,15 @@ impl Control {
     async fn set_aside(&self, id: ExperimentId, unsound: &StoreError) -> Result<(), StoreError> {
         let reason = unsound.to_string();
         error!(experiment = %id, reason, "experiment paused");
-        self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).insert(id);
         let now_ms = clock::unix_ms();
-        self.store.try_write(move |store| store.set_aside(id, now_ms, &reason)).await
+        self.store.try_write(move |store| store.set_aside(id, now_ms, &reason)).await?;
+        // Only now, so that one that was left alone waits on after a failed write.
+        lock(&self.left_alone).remove(&id);
+        lock(&self.set_aside).insert(id);
+        Ok(())
     }
+}
+
+fn lock(ids: &Mutex<BTreeSet<ExperimentId>>) -> MutexGuard<'_, BTreeSet<ExperimentId>> {
+    ids.lock().unwrap_or_else(PoisonError::into_inner)
 }

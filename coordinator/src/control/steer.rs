@@ -70,34 +70,37 @@ impl Control {
         if experiment.state.is_unfinished() {
             return Err(StoreError::Unfinished(id).into());
         }
-        let keyframe = match self.keyframe(id).await {
-            Ok(keyframe) => Some(keyframe),
-            Err(ControlError::Query(QueryError::Store(StoreError::NoCheckpoint(_)))) => None,
+        let none = (experiment.n_generations(), None);
+        let (n_generations, keyframe) = match self.keyframe(id).await {
+            Ok((n_generations, keyframe)) => (n_generations, Some(keyframe)),
+            Err(ControlError::Query(QueryError::Store(StoreError::NoCheckpoint(_)))) => none,
             // Older versions stored no state from which an experiment that ended early could
             // continue.
             Err(ControlError::Query(QueryError::Store(StoreError::Unsound { .. })))
                 if !experiment.can_be_continued() =>
             {
-                None
+                none
             }
             Err(error) => return Err(error),
         };
         let now_ms = clock::unix_ms();
-        // The driver no longer knows the experiment.
-        let prune = move |store: &mut Store| store.prune(id, keyframe.as_deref(), now_ms);
+        // The driver no longer knows the experiment, unless another client has reopened it
+        // meanwhile, which the store notices.
+        let prune =
+            move |store: &mut Store| store.prune(id, n_generations, keyframe.as_deref(), now_ms);
         let n_bytes = self.store.try_write(prune).await?;
         Ok((self.find(id).await?, n_bytes))
     }
 
-    /// The state of evolution after the latest generation.
-    async fn keyframe(&self, id: ExperimentId) -> Result<Vec<u8>, ControlError> {
-        let (_, checkpoint) = self.store.read(move |store| store.resumable(id)).await?;
+    /// The number of generations, and the state of evolution after them.
+    async fn keyframe(&self, id: ExperimentId) -> Result<(u64, Vec<u8>), ControlError> {
+        let (experiment, checkpoint) = self.store.read(move |store| store.resumable(id)).await?;
         let restoring = task::spawn_blocking(move || Evolution::restore(&checkpoint));
         let restored = restoring.await.map_err(|_| ControlError::Panicked("evolution"))?;
         let evolution = restored.map_err(|error| {
             StoreError::Corrupt(format!("the checkpoint of experiment {id}: {error}"))
         })?;
-        Ok(evolution.keyframe())
+        Ok((experiment.n_generations(), evolution.keyframe()))
     }
 
     /// Has the driver change an experiment that has not ended, and returns the changed

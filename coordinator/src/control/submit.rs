@@ -50,6 +50,8 @@ impl Control {
         }
         labels::check(&submission.labels).map_err(ControlError::Invalid)?;
         let _place = self.requests.enter(submission.config_json.len())?;
+        // Requests that wait for their turn must not hold a generation of tens of megabytes.
+        let turn = self.requests.turn(self.client).await;
         let stored = match fork_of {
             Some((id, generation)) => {
                 let read = move |store: &Store| StoredGeneration::read(store, id, generation);
@@ -67,7 +69,7 @@ impl Control {
             };
             Ok::<_, QueryError>(Submission { parent, ..submission }.check(goes_on))
         };
-        let checked = self.requests.check(self.client, check).await??;
+        let checked = self.requests.check_in(turn, check).await??;
         let CheckedSubmission { new, warnings } = checked?;
         // In a task of its own: the driver must hear of a stored experiment even if the client
         // goes away meanwhile.

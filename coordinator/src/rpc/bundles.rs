@@ -3,6 +3,7 @@
 use std::pin::Pin;
 
 use bundle::{BundleError, LEN_MAX};
+use model::queries::StoredBundle;
 use swarm_proto::v1::{ExportExperimentResponse, ImportExperimentRequest};
 use tokio::{
     sync::{OwnedSemaphorePermit, mpsc},
@@ -18,6 +19,12 @@ const PIECE_LEN: usize = 1 << 20;
 
 /// A bundle on its way to a client.
 pub type Pieces = Pin<Box<dyn Stream<Item = Result<ExportExperimentResponse, Status>> + Send>>;
+
+/// Packs a bundle; CPU-bound.
+pub fn pack(stored: StoredBundle) -> Result<Vec<u8>, Status> {
+    let bytes = stored.bundle()?.to_bytes();
+    bytes.map_err(|error| Status::failed_precondition(error.to_string()))
+}
 
 /// Sends a bundle. `place`: kept until the end, so that few bundles are in memory.
 pub fn send(bytes: Vec<u8>, place: OwnedSemaphorePermit) -> Pieces {

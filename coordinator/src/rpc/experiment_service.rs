@@ -2,7 +2,7 @@
 
 use std::{pin::Pin, sync::Arc};
 
-use model::queries::Reader;
+use model::queries::{Reader, StoredBundle};
 use swarm_proto::v1::{
     self, ExplainExperimentRequest, ExplainExperimentResponse, ExportExperimentRequest,
     ImportExperimentRequest, ImportExperimentResponse, SubmitExperimentRequest,
@@ -141,11 +141,10 @@ impl Experiments {
     ) -> Result<Response<bundles::Pieces>, Status> {
         let id = ExperimentId(request.into_inner().experiment_id);
         let place = self.place().await?;
-        let bundle = self.store.read(move |store| queries::bundle(store, id)).await?;
-        let bytes = task::spawn_blocking(move || bundle.to_bytes())
+        let stored = self.store.read(move |store| StoredBundle::read(store, id)).await?;
+        let bytes = task::spawn_blocking(move || bundles::pack(stored))
             .await
-            .map_err(|_| ControlError::Panicked("packing a bundle"))?
-            .map_err(|error| Status::failed_precondition(error.to_string()))?;
+            .map_err(|_| ControlError::Panicked("packing a bundle"))??;
         Ok(Response::new(bundles::send(bytes, place)))
     }
 

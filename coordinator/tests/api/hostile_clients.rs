@@ -2,11 +2,11 @@
 
 use std::net::Ipv4Addr;
 
-use coordinator::Coordinator;
+use coordinator::{Coordinator, labels::LABELS_MAX};
 use proptest::{collection::vec, prelude::*, sample::Index, test_runner::TestRunner};
 use serde_json::{Value, json};
 use swarm_proto::v1::{
-    CancelExperimentRequest, SubmitExperimentRequest,
+    CancelExperimentRequest, ExperimentState, ListExperimentsRequest, SubmitExperimentRequest,
     experiment_service_client::ExperimentServiceClient,
 };
 use tokio::runtime::Runtime;
@@ -120,5 +120,24 @@ async fn a_file_that_is_too_long_is_refused() {
         let config_json = " ".repeat(n_bytes);
         let request = SubmitExperimentRequest { config_json, ..Default::default() };
         assert_eq!(submit(client.clone(), request).await.unwrap_err().code(), expected);
+    }
+}
+
+#[tokio::test]
+async fn a_list_may_repeat_states_without_end_but_wants_few_labels() {
+    let (_coordinator, mut client, _data) = start().await;
+    let states = vec![ExperimentState::Running.into(); 40_000];
+    let request = ListExperimentsRequest { states, ..Default::default() };
+    client.list_experiments(request).await.unwrap();
+    let states = vec![ExperimentState::Unspecified.into(); 40_000];
+    let request = ListExperimentsRequest { states, ..Default::default() };
+    let error = client.list_experiments(request).await.unwrap_err();
+    assert_eq!(error.code(), Code::InvalidArgument, "{error}");
+    let refused = Some(Code::InvalidArgument);
+    for (n_labels, expected) in [(LABELS_MAX, None), (LABELS_MAX + 1, refused), (2000, refused)] {
+        let labels = (0..n_labels).map(|i| format!("k{i}=v")).collect();
+        let request = ListExperimentsRequest { labels, ..Default::default() };
+        let answer = client.list_experiments(request).await;
+        assert_eq!(answer.err().map(|error| error.code()), expected, "{n_labels}");
     }
 }

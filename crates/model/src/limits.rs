@@ -33,3 +33,6 @@ pub const UNFINISHED_MAX: usize = 1000;
 /// Most items per slot that a worker has, in progress or waiting. A worker fails items that its
 /// queue of this size cannot hold, so workers with a smaller value need a new protocol version.
 pub const ITEMS_PER_SLOT_MAX: usize = 64;
+/// Most numbers of an evaluation, 16 MiB: trials x steps x measures of the task, or the fitness and
+/// descriptors of genotypes in trials.
+pub const EVALUATION_VALUES_MAX: usize = 1 << 21;

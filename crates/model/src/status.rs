@@ -10,8 +10,10 @@ impl From<StoreError> for Status {
         match error {
             // Not UNAVAILABLE, which client libraries return when there is no coordinator.
             StoreError::Unavailable(_) => Self::resource_exhausted(text),
+            StoreError::ParentGone(_) => Self::not_found(text),
             StoreError::Ended(_)
             | StoreError::Unfinished(_)
+            | StoreError::WentOn(_)
             | StoreError::NeededByForks { .. }
             | StoreError::NoCheckpoint(_)
             | StoreError::Unsound { .. } => Self::failed_precondition(text),
@@ -36,6 +38,7 @@ impl From<QueryError> for Status {
             | QueryError::NoLineage(_) => Self::invalid_argument(text),
             QueryError::NoChampion(_)
             | QueryError::NotEnded(_)
+            | QueryError::TooLongForBundle { .. }
             | QueryError::NoGeneration { .. }
             | QueryError::NotInLog { .. }
             | QueryError::OtherBits { .. } => Self::failed_precondition(text),

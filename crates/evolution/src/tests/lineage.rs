@@ -102,7 +102,7 @@ fn families_have_parents_of_the_pedigree_with_fitness_of_parent_and_child() {
 }
 
 #[test]
-fn a_lineage_ends_where_its_pedigree_begins_and_a_distribution_has_none() {
+fn a_lineage_ends_where_its_pedigree_begins() {
     let (_, whole) = bred("uniform", 3);
     let first = whole.trace(0).last().unwrap().clone();
     assert_eq!((first.generation, first.birth.unwrap().operator), (0, Operator::First));
@@ -118,5 +118,13 @@ fn a_lineage_ends_where_its_pedigree_begins_and_a_distribution_has_none() {
     }
     let lineage = later.trace(8);
     assert!(lineage.iter().all(|ancestor| ancestor.birth.is_some() == (ancestor.generation == 2)));
-    assert!(Setup::new("SNES", D).start().unwrap().births().is_none());
+}
+
+#[test]
+fn individuals_have_parents_if_the_algorithm_keeps_individuals() {
+    for algorithm in by_fitness() {
+        let evolution = Setup::new(algorithm.name, D).start().unwrap();
+        let keeps_individuals = algorithm.keeps == Keeps::Population;
+        assert_eq!(evolution.births().is_some(), keeps_individuals, "{}", algorithm.name);
+    }
 }

@@ -10,8 +10,9 @@ use tonic::Status;
 
 use crate::{
     ids::ExperimentId,
+    labels::LABELS_MAX,
     limits::PAGE_LEN_MAX,
-    store::{Filter, GenerationRecord},
+    store::{ExperimentState, Filter, GenerationRecord},
 };
 
 use super::{Reader, experiment};
@@ -99,9 +100,16 @@ impl Reader {
     }
 }
 
-/// The filters of a client; INVALID_ARGUMENT for an unknown state.
+/// The filters of a client; INVALID_ARGUMENT for an unknown state, and for more labels than an
+/// experiment has. Each state and each label takes time and a variable of SQL.
 fn filter(request: ListExperimentsRequest) -> Result<Filter, Status> {
-    let states = request.states().map(TryInto::try_into).collect::<Result<_, _>>()?;
+    let mut states: Vec<ExperimentState> = Vec::new();
+    for state in request.states() {
+        let state: ExperimentState = state.try_into()?;
+        if !states.contains(&state) {
+            states.push(state);
+        }
+    }
     let ListExperimentsRequest {
         named,
         labels,
@@ -111,6 +119,12 @@ fn filter(request: ListExperimentsRequest) -> Result<Filter, Status> {
         page_size,
         ..
     } = request;
+    if labels.len() > LABELS_MAX {
+        return Err(Status::invalid_argument(format!(
+            "an experiment has at most {LABELS_MAX} labels, so a list cannot want {}",
+            labels.len()
+        )));
+    }
     let some = |text: String| (!text.is_empty()).then_some(text);
     let label = |label: String| match label.split_once('=') {
         Some((key, value)) => (key.to_owned(), Some(value.to_owned())),

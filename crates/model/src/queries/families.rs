@@ -108,7 +108,7 @@ impl StoredFamilies {
             if of.generation % every == 0 {
                 let families = evolution.families(&before, &told);
                 let families = families.ok_or_else(|| match evolution.n_descriptors() {
-                    0 => no_parents(&experiment, &config),
+                    0 => no_parents(&experiment),
                     _ => QueryError::NoLineage(format!(
                         "the parents in experiment {0} are elites of many generations; `swarmctl \
                          lineage {0}@{1}/0` shows them",
@@ -131,7 +131,7 @@ impl StoredFamilies {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use serde_json::{Value, json};
 
     use super::*;
@@ -139,7 +139,11 @@ mod tests {
 
     const POPULATION: usize = 6;
 
-    fn store_with(algorithm: &str, n_generations: u64) -> (tempfile::TempDir, Store, ExperimentId) {
+    /// A run of this algorithm that has completed.
+    pub fn store_with(
+        algorithm: &str,
+        n_generations: u64,
+    ) -> (tempfile::TempDir, Store, ExperimentId) {
         let quickstart = include_str!("../../../../configs/quickstart.json");
         let mut config: Value = serde_json::from_str(quickstart).unwrap();
         let section = &mut config["algorithm"];
@@ -201,7 +205,7 @@ mod tests {
     #[test]
     fn generations_that_were_pruned_and_individuals_without_parents_are_refused() {
         let (_directory, mut store, id) = store_with("GA", 5);
-        assert!(store.prune(id, None, 9).unwrap() > 0);
+        assert!(store.prune(id, 5, None, 9).unwrap() > 0);
         let error = page(&store, id, 0, 1).unwrap_err();
         assert!(matches!(error, QueryError::NotInLog { .. }), "{error}");
 

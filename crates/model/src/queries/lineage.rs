@@ -1,7 +1,7 @@
 //! Finds the ancestors of an individual by repeating its generations.
 
-use evolution::{Ancestor, Checkpoint, Evolution, Operator, Pedigree, Told};
-use experiment_file::ExperimentConfig;
+use evolution::{ALGORITHMS, Ancestor, Checkpoint, Evolution, Operator, Pedigree, Told};
+use experiment_file::{AlgorithmDescription, Keeps};
 use swarm_proto::v1::{
     self, BirthOperator, GenesOfParent, GetLineageRequest, GetLineageResponse, PopulationLineage,
 };
@@ -10,7 +10,7 @@ use tonic::Status;
 use crate::{
     Address, Who,
     limits::{ANCESTORS_MAX, LINEAGE_GENES_MAX},
-    store::{LogEntry, Store, StoredExperiment},
+    store::{ExperimentRecord, LogEntry, Store, StoredExperiment},
 };
 
 use super::{
@@ -54,6 +54,11 @@ impl StoredLineage {
         let experiment = experiment(store, id)?;
         check_in_log(store, &experiment, generation)?;
         let first = generation.saturating_sub(depth.into()).max(experiment.log_from);
+        // Before the log is read, which may be long, while others wait for the store.
+        check_size(&experiment, generation + 1 - first)?;
+        if keeps_no_individuals(&experiment) {
+            return Err(no_parents(&experiment));
+        }
         let damaged = || QueryError::DamagedLog { experiment: id, generation };
         let (checkpoint, ..) = store.generation_in_log(id, first)?.ok_or_else(damaged)?;
         let log = store.log_between(id, first, generation + 1)?.ok_or_else(damaged)?;
@@ -67,16 +72,12 @@ impl StoredLineage {
         let (id, generation) = (experiment.id, first + log.len() as u64 - 1);
         let other = |what: String| other_bits(&experiment, generation, what);
         let config = config(&experiment, generation)?;
-        let size = u64::from(config.algorithm.population_size);
-        if size * experiment.genotype_len * log.len() as u64 > LINEAGE_GENES_MAX {
-            return Err(too_deep());
-        }
         let names: Vec<String> = config.algorithm.populations.keys().cloned().collect();
         let mut pedigrees = vec![Pedigree::starting_at(first); names.len()];
         let mut evolution =
             Evolution::restore(&checkpoint).map_err(|error| other(error.to_string()))?;
         for (of, entry) in &log {
-            let births = evolution.births().ok_or_else(|| no_parents(&experiment, &config))?;
+            let births = evolution.births().ok_or_else(|| no_parents(&experiment))?;
             let told = Told::from_bytes(entry).map_err(|error| other(error.to_string()))?;
             let n_individuals = told.trial_fitness.len() as u32;
             if of.generation == generation && individual >= n_individuals {
@@ -141,14 +142,55 @@ fn ancestor(ancestor: Ancestor) -> v1::Ancestor {
     }
 }
 
+/// Checks that the genes of this number of generations are within the limit.
+fn check_size(experiment: &ExperimentRecord, n_generations: u64) -> Result<(), QueryError> {
+    let n_individuals = experiment.summary.population_size.saturating_mul(n_generations);
+    match n_individuals.saturating_mul(experiment.genotype_len) {
+        n_genes if n_genes > LINEAGE_GENES_MAX => Err(too_deep()),
+        _ => Ok(()),
+    }
+}
+
+/// Whether the algorithm keeps no individuals, so that nobody can be a parent. Of those that keep
+/// some, CMA-MAE draws from distributions, too.
+fn keeps_no_individuals(experiment: &ExperimentRecord) -> bool {
+    let algorithm = AlgorithmDescription::find(ALGORITHMS, &experiment.summary.algorithm);
+    algorithm.is_some_and(|found| matches!(found.keeps, Keeps::Vectors | Keeps::Matrix))
+}
+
 /// The error if the algorithm draws individuals from a distribution.
-pub fn no_parents(experiment: &StoredExperiment, config: &ExperimentConfig) -> QueryError {
+pub fn no_parents(experiment: &ExperimentRecord) -> QueryError {
     QueryError::NoLineage(format!(
         "experiment {} evolves a distribution, by {}: its individuals have no parents",
-        experiment.id, config.algorithm.name
+        experiment.id, experiment.summary.algorithm
     ))
 }
 
 fn too_deep() -> QueryError {
     QueryError::NoLineage("the lineage is too large: ask for less depth".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::queries::families::tests::store_with;
+
+    /// Why there is no lineage in a database without a log.
+    fn refusal(algorithm: &str, edit: &str) -> QueryError {
+        let (_directory, store, id) = store_with(algorithm, 3);
+        let edit = format!("DELETE FROM fitness_log; {edit}");
+        store.connection().execute_batch(&edit).unwrap();
+        let address = format!("{id}@2/0").parse().unwrap();
+        StoredLineage::read(&store, address, 9).unwrap_err()
+    }
+
+    #[test]
+    fn a_lineage_that_is_too_large_or_without_parents_is_refused_before_the_log_is_read() {
+        let error = refusal("GA", "");
+        assert!(matches!(error, QueryError::DamagedLog { .. }), "{error}");
+        let error = refusal("GA", "UPDATE experiments SET genotype_len = 1 << 40");
+        assert!(error.to_string().contains("too large"), "{error}");
+        let error = refusal("SNES", "");
+        assert!(error.to_string().contains("by SNES: its individuals have no parents"), "{error}");
+    }
 }

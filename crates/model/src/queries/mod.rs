@@ -25,7 +25,7 @@ use crate::{
     store::{Store, StoreError, StoredExperiment},
 };
 
-pub use bundle::bundle;
+pub use bundle::StoredBundle;
 pub use explanation::{incompatibility, latest_notices};
 pub use families::Families;
 use fitness::fitness;
@@ -41,6 +41,19 @@ pub enum QueryError {
     /// Only an ended experiment has a bundle.
     #[error("experiment {0} has not ended: `swarmctl watch {0}` ends when it has")]
     NotEnded(ExperimentId),
+    /// The fitness log is longer than a bundle may be.
+    #[error(
+        "experiment {experiment} does not fit into a bundle: its fitness log and its keyframes \
+         have {} MiB, but all files of a bundle together have at most {}",
+        len.div_ceil(1 << 20),
+        ::bundle::UNPACKED_LEN_MAX >> 20
+    )]
+    TooLongForBundle {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// Bytes of its log and its keyframes.
+        len: u64,
+    },
     /// There is no champion yet.
     #[error("experiment {0} has no champion yet: its first generation is not complete")]
     NoChampion(ExperimentId),

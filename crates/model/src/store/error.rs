@@ -159,6 +159,15 @@ pub enum StoreError {
         "experiment {0} has not ended, and needs its fitness log to continue; prune it after its end"
     )]
     Unfinished(ExperimentId),
+    /// The experiment has been reopened and has ended again since its state was read.
+    #[error("experiment {0} went on meanwhile; repeat the command")]
+    WentOn(ExperimentId),
+    /// The parent of a new fork was deleted during the fork's check, or its history is damaged.
+    #[error(
+        "there is no experiment {0} with the generations that its fork would share; \
+         `swarmctl list` shows all experiments"
+    )]
+    ParentGone(ExperimentId),
     /// Forks of the experiment share generations with it that are stored nowhere else.
     #[error(
         "the fitness log of experiment {id} has the only copy of generations of its {}; \

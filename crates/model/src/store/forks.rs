@@ -3,7 +3,7 @@
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 use super::{
-    ForkRecord, LogGap, Result, StoreError, fitness_log, history,
+    ForkRecord, GenerationRecord, LogGap, Result, StoreError, fitness_log, history,
     seals::{Seal, Sealer},
 };
 use crate::ids::ExperimentId;
@@ -37,13 +37,19 @@ pub fn put(
 }
 
 /// Copies to a new fork the history that it shares with its parent, with the times of completion.
+/// Returns the last shared generation.
 pub fn copy_history(
     transaction: &Transaction<'_>,
     sealer: &Sealer,
     id: ExperimentId,
     fork: &ForkRecord,
-) -> rusqlite::Result<()> {
-    let shared = history::read_between(transaction, fork.parent, 0, fork.generation + 1)?;
+) -> Result<GenerationRecord> {
+    let n_shared = fork.generation + 1;
+    let mut shared = history::read_between(transaction, fork.parent, 0, n_shared)?;
+    // The parent may have been deleted during the check of its fork.
+    if shared.len() as u64 != n_shared {
+        return Err(StoreError::ParentGone(fork.parent));
+    }
     for generation in &shared {
         history::put(transaction, sealer, id, generation)?;
     }
@@ -54,7 +60,8 @@ pub fn copy_history(
          FROM events WHERE experiment_id = ?2 AND kind = 'generation' AND generation <= ?3",
         params![id.0, fork.parent.0, fork.generation],
     )?;
-    fitness_log::begin_at(transaction, id, fork.generation + 1, LogGap::Forked)
+    fitness_log::begin_at(transaction, id, n_shared, LogGap::Forked)?;
+    Ok(shared.pop().expect("at least generation 0 is shared"))
 }
 
 /// The origin of an experiment, if it is a fork; a broken seal is damage. `sealer`: `None` if the

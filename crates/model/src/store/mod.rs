@@ -166,7 +166,8 @@ impl Store {
     }
 
     /// Adds an experiment. If an earlier experiment has the same `request_id`, adds nothing and
-    /// returns the earlier id.
+    /// returns the earlier id. Fails with [`StoreError::ParentGone`] if it is a fork of an
+    /// experiment that lacks the shared generations.
     pub fn create(&mut self, new: &NewExperiment, now_ms: u64) -> Result<(ExperimentId, bool)> {
         if let Some(request_id) = &new.request_id
             && let Some(id) = self.experiment_of_request(request_id)?
@@ -198,9 +199,7 @@ impl Store {
             let mut latest = None;
             if let Some(fork) = &new.fork {
                 forks::put(transaction, sealer, id, fork)?;
-                forks::copy_history(transaction, sealer, id, fork)?;
-                let (first, end) = (fork.generation, fork.generation + 1);
-                latest = history::read_between(transaction, id, first, end)?.pop();
+                latest = Some(forks::copy_history(transaction, sealer, id, fork)?);
                 let sql = "UPDATE experiments SET digest = ?2 WHERE id = ?1";
                 transaction.execute(sql, params![id.0, fork.link])?;
                 if let Some(champion) = &new.champion {
@@ -332,15 +331,24 @@ impl Store {
     }
 
     /// Deletes the fitness log of an experiment that has ended, unless forks share generations of
-    /// it ([`StoreError::NeededByForks`]). `keyframe`: the latest state of evolution, from which
-    /// more generations would continue. Returns the number of free bytes.
-    pub fn prune(&mut self, id: ExperimentId, keyframe: Option<&[u8]>, now_ms: u64) -> Result<u64> {
+    /// it ([`StoreError::NeededByForks`]). `keyframe`: the state of evolution after
+    /// `n_generations`, from which more generations would continue. Fails with
+    /// [`StoreError::WentOn`] if that is not the latest state. Returns the number of free bytes.
+    pub fn prune(
+        &mut self,
+        id: ExperimentId,
+        n_generations: u64,
+        keyframe: Option<&[u8]>,
+        now_ms: u64,
+    ) -> Result<u64> {
         self.write(|transaction, sealer| {
             let Some(found) = experiments::get(transaction, id)? else { return Ok(0) };
             if found.state.is_unfinished() {
                 return Err(StoreError::Unfinished(id));
             }
-            let n_generations = found.latest.as_ref().map_or(0, |latest| latest.generation + 1);
+            if found.n_generations() != n_generations {
+                return Err(StoreError::WentOn(id));
+            }
             if found.log_from >= n_generations {
                 return Ok(0);
             }

@@ -351,14 +351,14 @@ fn pruning_frees_the_log_of_an_ended_experiment_and_keeps_its_latest_state() {
         commit(&mut store, ids[1], number, None).unwrap();
         commit(&mut store, ids[0], number, (number == 2).then_some("")).unwrap();
     }
-    let refused = store.prune(ids[1], None, 7);
+    let refused = store.prune(ids[1], 3, None, 7);
     assert!(matches!(refused, Err(StoreError::Unfinished(id)) if id == ids[1]), "{refused:?}");
     store.set_state(ids[1], 7, ExperimentState::Cancelled, "enough").unwrap();
     let history = store.generations(ids[0], 0, 9).unwrap();
 
-    assert!(store.prune(ids[0], Some(b"now"), 8).unwrap() > 0);
-    assert!(store.prune(ids[1], None, 8).unwrap() > 0);
-    assert_eq!(store.prune(ids[0], Some(b"now"), 9).unwrap(), 0, "it is pruned already");
+    assert!(store.prune(ids[0], 3, Some(b"now"), 8).unwrap() > 0);
+    assert!(store.prune(ids[1], 3, None, 8).unwrap() > 0);
+    assert_eq!(store.prune(ids[0], 3, Some(b"now"), 9).unwrap(), 0, "it is pruned already");
     let now = Checkpoint { keyframe: b"now".to_vec(), ..Checkpoint::default() };
     assert_eq!(store.resumable(ids[0]).unwrap().1, now);
     assert!(store.resumable(ids[1]).is_err(), "nothing continues from it");
@@ -376,6 +376,19 @@ fn pruning_frees_the_log_of_an_ended_experiment_and_keeps_its_latest_state() {
     drop(store);
     let problems = inspect(directory.path()).unwrap().findings;
     assert!(problems.iter().all(|problem| !problem.what.contains("keyframe")), "{problems:?}");
+}
+
+#[test]
+fn an_experiment_that_went_on_since_its_state_was_read_is_not_pruned() {
+    let (_directory, mut store) = open();
+    let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+    commit(&mut store, id, 0, Some("")).unwrap();
+    store.reopen(id, ExperimentState::Completed, "longer", "more", 6).unwrap();
+    commit(&mut store, id, 1, Some("")).unwrap();
+    let refused = store.prune(id, 1, Some(b"after 0"), 7).unwrap_err();
+    assert!(matches!(refused, StoreError::WentOn(other) if other == id), "{refused}");
+    assert_eq!(store.resumable(id).unwrap().1, checkpoint_after(1), "nothing is deleted");
+    assert!(store.prune(id, 2, Some(b"after 1"), 8).unwrap() > 0);
 }
 
 #[test]

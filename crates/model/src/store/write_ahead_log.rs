@@ -12,10 +12,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use rusqlite::Connection;
+use rusqlite::{Connection, config::DbConfig};
+
+use super::Store;
 
 /// Number of pages in the log at which it is moved into the main file; SQLite's default.
 const N_PAGES_MAX: u32 = 1000;
+
+/// Keeps the log when the connection closes. Otherwise SQLite moves it into the main file, and
+/// deletes it.
+const KEEPS_LOG: DbConfig = DbConfig::SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE;
 
 /// Makes this program move the log, instead of SQLite.
 pub fn configure(connection: &Connection) -> rusqlite::Result<()> {
@@ -51,8 +57,26 @@ pub fn fold(connection: &Connection) -> rusqlite::Result<()> {
     set_missed(connection, true)?;
     // Never waits: pages that a reader still needs stay in the log.
     let folded = connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()));
-    set_missed(connection, false)?;
+    clear(connection)?;
     folded
+}
+
+/// Clears the flag. If that fails, for instance because the disk is full, the log outlives the
+/// connection: without it, the main file would still have the flag.
+fn clear(connection: &Connection) -> rusqlite::Result<()> {
+    let cleared = set_missed(connection, false);
+    connection.set_db_config(KEEPS_LOG, cleared.is_err())?;
+    cleared
+}
+
+impl Drop for Store {
+    /// Clears a flag that could not be cleared before, so that the main file needs no log.
+    fn drop(&mut self) {
+        if self.connection.db_config(KEEPS_LOG) == Ok(true) {
+            // After another failure, the log stays, and the next start reads it.
+            let _ = clear(&self.connection);
+        }
+    }
 }
 
 /// Sets or clears the flag.

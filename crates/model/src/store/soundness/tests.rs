@@ -223,6 +223,27 @@ fn a_long_log_is_moved_into_the_main_file_which_still_needs_it() {
 }
 
 #[test]
+fn a_database_that_could_not_clear_its_flag_opens_again() {
+    for has_room_at_the_end in [true, false] {
+        let directory = tempfile::tempdir().unwrap();
+        let mut store = Store::open(directory.path()).unwrap();
+        let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+        // It ends with the connection, as the lack of room ends before the next start.
+        let full = "CREATE TEMP TRIGGER no_room BEFORE UPDATE ON main.identity
+                    WHEN NOT NEW.needs_log BEGIN SELECT RAISE(ABORT, 'full'); END";
+        store.connection.execute_batch(full).unwrap();
+        write_ahead_log::fold(&store.connection).unwrap_err();
+        if has_room_at_the_end {
+            store.connection.execute_batch("DROP TRIGGER no_room").unwrap();
+        }
+        drop(store);
+        let has_log = write_ahead_log::exists(&file::path_in(directory.path()));
+        assert_eq!(has_log, !has_room_at_the_end);
+        Store::open(directory.path()).unwrap().resumable(id).unwrap();
+    }
+}
+
+#[test]
 fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     let directory = tempfile::tempdir().unwrap();
     let (mut store, [running, ended]) = two_experiments(directory.path());

@@ -239,13 +239,16 @@ fn every_program_finds_a_recovered_ended_experiment_sound() {
     assert!(!findings(&recovered).is_empty());
 }
 
-/// A fork of an experiment after its generation 0.
-fn fork_of(store: &mut Store, parent: ExperimentId) -> ExperimentId {
-    let found = store.experiment(parent).unwrap().unwrap();
+/// A fork of an experiment after its generation 0, for the store.
+fn new_fork(store: &Store, parent: ExperimentId) -> NewExperiment {
     let link = store.generations(parent, 0, 1).unwrap()[0].1.digest.clone();
     let keyframe = store.resumable(parent).unwrap().1.keyframe;
-    let fork = ForkRecord { parent: found.id, generation: 0, link, changes: Vec::new() };
-    let new = NewExperiment { fork: Some(fork), keyframe, ..new_experiment(None) };
+    let fork = ForkRecord { parent, generation: 0, link, changes: Vec::new() };
+    NewExperiment { fork: Some(fork), keyframe, ..new_experiment(None) }
+}
+
+fn fork_of(store: &mut Store, parent: ExperimentId) -> ExperimentId {
+    let new = new_fork(store, parent);
     store.create(&new, 5).unwrap().0
 }
 
@@ -266,10 +269,23 @@ fn generations_that_forks_need_are_deleted_only_after_the_forks() {
         assert!(refused.contains(&format!("swarmctl delete {fork}")), "{refused}");
         assert!(store.experiment(id).unwrap().is_some());
     }
-    let refused = store.prune(parent, None, 9).unwrap_err();
+    let refused = store.prune(parent, 1, None, 9).unwrap_err();
     assert!(matches!(refused, StoreError::NeededByForks { .. }), "{refused}");
     for id in [grandchild, child, parent] {
         store.delete(id).unwrap();
     }
+    assert_eq!(store.experiments(&Filter::default()).unwrap().len(), 0);
+}
+
+#[test]
+fn a_fork_of_an_experiment_that_was_deleted_meanwhile_is_refused_and_leaves_nothing_behind() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = Store::open(directory.path()).unwrap();
+    let (parent, _) = store.create(&new_experiment(None), 5).unwrap();
+    advance(&mut store, parent, Some(""));
+    let fork = new_fork(&store, parent);
+    store.delete(parent).unwrap();
+    let refused = store.create(&fork, 6).unwrap_err();
+    assert!(matches!(refused, StoreError::ParentGone(id) if id == parent), "{refused}");
     assert_eq!(store.experiments(&Filter::default()).unwrap().len(), 0);
 }
