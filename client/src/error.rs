@@ -320,7 +320,6 @@ impl Error {
     /// The error of a failed call to the services on a data directory.
     pub fn from_status_here(status: &Status, data_dir: &str) -> Self {
         match status.code() {
-            Grpc::ResourceExhausted => Self::Input(status.message().into()),
             Grpc::Unavailable | Grpc::Internal | Grpc::Unknown => {
                 Self::Internal(format!("{data_dir}: {}", reason(status)))
             }
@@ -364,6 +363,9 @@ impl Error {
             Grpc::NotFound => Self::NotFound(message.into()),
             Grpc::FailedPrecondition => Self::WrongState(message.into()),
             Grpc::InvalidArgument => Self::Input(message.into()),
+            Grpc::ResourceExhausted | Grpc::OutOfRange => {
+                Self::at(Code::LimitReached, address, message)
+            }
             Grpc::DataLoss => Self::Damaged(message.into()),
             Grpc::Unauthenticated | Grpc::PermissionDenied => {
                 Self::Denied { address: address.into(), refusal: message.into() }

@@ -57,7 +57,7 @@ codes! {
             "free space on the disk, then repeat the command";
     }
     2: "bad input: arguments, settings, a token, a certificate, a genotype, an experiment file, a \
-        directory, a file to write" {
+        directory, a file to write; or a limit is reached" {
         BadArgument, "bad_argument",
             "the command line has an unknown command or option, or a value that is not allowed",
             "`swarmctl COMMAND --help` explains every argument";
@@ -89,6 +89,9 @@ codes! {
         AmbiguousName, "ambiguous_name",
             "several experiments have this name",
             "give the number of one of them";
+        LimitReached, "limit_reached",
+            "at present the coordinator can compute or store no more, or the request is too large",
+            "repeat the command later, or ask for less";
         NeedsConsent, "needs_consent",
             "the command would delete something, and nothing was changed",
             "list what would change with --dry-run, then confirm it with --yes";

@@ -16,6 +16,8 @@ fn exit_codes_follow_status_codes() {
     assert_eq!(exit_code(Status::invalid_argument("no")), 2);
     assert_eq!(exit_code(Status::not_found("no experiment 3")), 3);
     assert_eq!(exit_code(Status::failed_precondition("no champion yet")), 3);
+    assert_eq!(exit_code(Status::resource_exhausted("no memory")), 2);
+    assert_eq!(exit_code(Status::out_of_range("too large")), 2);
     assert_eq!(exit_code(Status::unavailable("")), 4);
     assert_eq!(exit_code(Status::unauthenticated("no token")), 7);
     assert_eq!(exit_code(Status::permission_denied("wrong token")), 7);
@@ -24,6 +26,15 @@ fn exit_codes_follow_status_codes() {
     assert_eq!(exit_code(Status::internal(json)), 9);
     let missing = "grpc-status header missing, mapped from HTTP status code 503";
     assert_eq!(exit_code(Status::unavailable(missing)), 9);
+}
+
+#[test]
+fn a_limit_is_no_bug_wherever_it_is_reached() {
+    let status = Status::resource_exhausted("1000 experiments are unfinished");
+    for error in [Error::from_status(&status, ADDRESS), Error::from_status_here(&status, "data")] {
+        assert_eq!(error.code(), Code::LimitReached);
+        assert_eq!(error.report(), "error: 1000 experiments are unfinished");
+    }
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn on_a_full_disk_an_experiment_waits_and_goes_on_by_itself() {
 
     // A client that submits now gets the reason, and not the error of an absent coordinator.
     let refused = coordinator.swarmctl(&["submit", (TINY.make)().path().to_str().unwrap()]);
-    assert_eq!(refused.code, Some(1), "{refused:#?}");
+    assert_eq!(refused.code, Some(2), "{refused:#?}");
     assert!(refused.stderr.contains("disk is full"), "{}", refused.stderr);
     assert!(!refused.stderr.contains("cannot reach"), "{}", refused.stderr);
     // Commands that only read still work.
@@ -122,7 +122,7 @@ fn an_end_that_cannot_be_stored_is_stored_once_it_can() {
         .unwrap();
     // Its client does not wait for long, and does not get the error of an absent coordinator.
     let cancelled = coordinator.swarmctl(&["cancel", &id.to_string()]);
-    assert_eq!(cancelled.code, Some(1), "{cancelled:#?}");
+    assert_eq!(cancelled.code, Some(2), "{cancelled:#?}");
     assert!(cancelled.stderr.contains("did not store the change"), "{}", cancelled.stderr);
     let waits = format!("the end of experiment {id} waits");
     coordinator.process.wait_for("complaint", |line| message_contains(line, &waits));
