@@ -92,9 +92,13 @@ impl Connection {
             );
             return Err(Error::at(Code::BadArgument, address, message));
         }
-        let (experiment, config_json) = self.stored(address.experiment.0).await?;
+        let (mut experiment, mut config_json) = self.stored(address.experiment.0).await?;
         let answer = self.individuals(address, 0).await?;
         let individual = present(answer.individuals.into_iter().next())?;
+        if let Who::Cell(..) = address.who {
+            // The elite of a fork may have been born in the parent.
+            (experiment, config_json) = self.stored(individual.experiment_id).await?;
+        }
         Ok(Found { experiment, config_json, individual })
     }
 }

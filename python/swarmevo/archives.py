@@ -32,16 +32,21 @@ def to_ribs(run: RecordedRun, find: Callable[[], Any]) -> Any:
     elites = [found.elites[place] for place in found.shown]
     if not elites:
         return archive
-    genotypes: dict[tuple[int, int], Any] = {}
-    for generation in sorted({elite.generation for elite in elites}):
-        individuals = run.individuals(generation).genotypes
-        born = (elite.individual for elite in elites if elite.generation == generation)
-        genotypes |= {(generation, individual): individuals[individual] for individual in born}
+    genotypes: dict[str, Any] = {}
+    for experiment, generation in sorted({(elite.experiment_id, elite.generation) for elite in elites}):
+        individuals = run._records._run(experiment).individuals(generation).genotypes
+        born = (elite for elite in elites if (elite.experiment_id, elite.generation) == (experiment, generation))
+        genotypes |= {elite_address(elite): individuals[elite.individual] for elite in born}
     worth = [elite.judged if elite.HasField("judged") else elite for elite in elites]
     archive.add(
-        np.array([genotypes[elite.generation, elite.individual] for elite in elites]),
+        np.array([genotypes[elite_address(elite)] for elite in elites]),
         np.array([it.fitness for it in worth]),
         np.array([it.descriptors for it in worth]),
-        address=np.array([f"{run.id}@{it.generation}/{it.individual}" for it in elites], dtype=object),
+        address=np.array([elite_address(elite) for elite in elites], dtype=object),
     )
     return archive
+
+
+def elite_address(elite: Any) -> str:
+    """The address of an elite, from its message. A fork has elites that were born in its parent."""
+    return f"{elite.experiment_id}@{elite.generation}/{elite.individual}"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import arguments, protocol
-from .archives import to_ribs
+from .archives import elite_address, to_ribs
 from .champion import Champion, Judged, Origin, Selection
 from .experiment import Experiment, config_text
 from .extras import needs
@@ -77,14 +77,14 @@ class Records(ABC):
     def individual(self, address: str | int) -> Champion:
         """The genotype at an address, bit for bit: ``3`` is the champion of experiment 3,
         ``3@5/7`` individual 7 of its generation 5, ``3@5/mean`` the mean of the distribution
-        after that."""
+        after that, ``3@5/cell(2,9)`` the elite of a cell of the repertoire after it."""
         if not isinstance(address, str):
             address = str(arguments.whole(address, "an address is a text such as 3@5/7, or a number: it", 1))
         if "@" in address and "/" not in address:
             raise ValueError(f"`{address}` is a generation; name one individual, such as {address}/0")
         found = self._call("GetIndividuals", address=address).individuals
-        number = address.partition("@")[0]
-        of = self._call("GetExperiment", experiment_id=int(number)).experiment
+        # The elite of a cell of a fork may have been born in the parent.
+        of = self._call("GetExperiment", experiment_id=found[0].experiment_id).experiment
         return champion_of(found[0])._from(Origin(of.config_digest, of.name, of.seed, of.simulation))
 
     @abstractmethod
@@ -281,7 +281,7 @@ class RecordedRun:
         def row(place: int, elite: Any) -> dict[str, Any]:
             judged = elite.judged if elite.HasField("judged") else None
             return {
-                "address": f"{self.id}@{elite.generation}/{elite.individual}",
+                "address": elite_address(elite),
                 "shown": place in shown,
                 "trials": elite.trials,
                 "fitness": elite.fitness,

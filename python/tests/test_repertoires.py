@@ -13,19 +13,38 @@ PROJECT = Path(__file__).resolve().parents[2]
 TASK = PROJECT / "configs/repertoires/flocking.json"
 
 
-@pytest.fixture(scope="module")
-def run(programs, tmp_path_factory):
-    directory = tmp_path_factory.mktemp("repertoires")
+def swarmctl(programs, *args):
+    subprocess.run([programs / "swarmctl", *args], check=True, capture_output=True)
+
+
+def evolved(programs, directory, algorithm):
+    """A data directory with a short run of an algorithm."""
     config = swarmevo.Experiment.from_file(TASK).to_dict()
     config["algorithm"] |= {
-        "generations": 4, "population_size": 12, "num_evaluations": 2, "evaluation_steps": 20, "champion_trials": 2,
-        "judgement_trials": 3,
+        "name": algorithm, "generations": 4, "population_size": 12, "num_evaluations": 2, "evaluation_steps": 20,
+        "champion_trials": 2, "judgement_trials": 3,
     }
+    for population in config["algorithm"]["populations"].values():
+        population["params"] = {}
     file = directory / "flocking.json"
     file.write_text(json.dumps(config))
-    data = directory / "data"
-    subprocess.run([programs / "swarmctl", "run", file, "--data-dir", data], check=True, capture_output=True)
-    return swarmevo.open(data).run(1)
+    swarmctl(programs, "run", file, "--data-dir", directory / "data")
+    return directory / "data"
+
+
+@pytest.fixture(scope="module")
+def run(programs, tmp_path_factory):
+    return swarmevo.open(evolved(programs, tmp_path_factory.mktemp("repertoires"), "MAP-Elites")).run(1)
+
+
+@pytest.fixture(scope="module")
+def forked(programs, tmp_path_factory):
+    """Run 3 continues run 2 after its generation 3, and run 2 the first one after its generation 1. Their algorithm
+    has room for all individuals."""
+    data = evolved(programs, tmp_path_factory.mktemp("forked"), "DNS")
+    for start, seed, generations in (("1@1", "2", "5"), ("2@3", "3", "6")):
+        swarmctl(programs, "fork", start, "--seed", seed, "--generations", generations, "--data-dir", data)
+    return swarmevo.open(data)
 
 
 def test_a_row_is_an_elite_with_its_behaviour_and_its_worth(run):
@@ -105,3 +124,31 @@ def test_before_the_end_ribs_has_the_evidence(run):
     shown = elites[elites["shown"]]
     kept = run.to_ribs(1).data(return_type="dict")
     assert dict(zip(kept["address"], kept["objective"])) == dict(zip(shown["address"], shown["fitness"]))
+
+
+def test_elites_of_forks_have_the_address_of_their_birth(forked):
+    pytest.importorskip("pandas")
+    elites = forked.run(3).repertoire(4)
+    born = {address: tuple(map(int, address.replace("/", "@").split("@"))) for address in elites["address"]}
+    for experiment, generation, _ in born.values():
+        assert experiment == (1 if generation <= 1 else 2 if generation <= 3 else 3)
+    assert {experiment for experiment, _, _ in born.values()} == {1, 2, 3}
+    shown = elites[elites["shown"]]
+    for address, cell in zip(shown["address"], shown["cell"]):
+        experiment, generation, individual = born[address]
+        found = forked.individual(address)
+        assert (found.generation, found.individual) == (generation, individual)
+        assert found.origin.config_digest == forked.run(experiment).experiment.config_digest
+        of_cell = forked.individual(f"3@4/cell({cell[0]},{cell[1]})")
+        assert np.array_equal(of_cell.genotype, found.genotype) and of_cell.origin == found.origin
+
+
+def test_ribs_has_the_elites_that_a_fork_takes_over(forked):
+    for package in ("pandas", "ribs"):
+        pytest.importorskip(package)
+    elites = forked.run(2).repertoire(2)
+    kept = forked.run(2).to_ribs(2).data(return_type="dict")
+    assert set(kept["address"]) == set(elites["address"][elites["shown"]])
+    assert any(address.startswith("1@") for address in kept["address"])
+    for address, genotype in zip(kept["address"], kept["solution"]):
+        assert np.array_equal(forked.individual(address).genotype, genotype)

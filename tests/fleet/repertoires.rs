@@ -1,5 +1,7 @@
 //! Repertoires on a fleet: the same bits through kills and audits, proofs, forks, addresses.
 
+use std::collections::BTreeSet;
+
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, swarmctl};
 use serde_json::json;
 
@@ -55,6 +57,43 @@ fn forks_continue_a_repertoire_and_cannot_change_its_descriptors() {
     // Individuals of distributions have no parents.
     let refused = coordinator.swarmctl(&["lineage", "5@3/9"]);
     assert_eq!(refused.code, Some(2), "{refused:#?}");
+}
+
+#[test]
+fn elites_of_forks_have_the_address_of_their_birth() {
+    let coordinator = CoordinatorProcess::start();
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    // Its repertoire has room for all individuals.
+    coordinator.watch(coordinator.submit(&experiment("DNS", 4).path())).finish();
+    for (from, seed, generations, id) in [("1@1", "2", "5", 2), ("2@3", "3", "6", 3)] {
+        let fork = ["fork", from, "--seed", seed, "--generations", generations];
+        coordinator.swarmctl(&fork).expect_success();
+        coordinator.watch(id).finish();
+    }
+    let found = coordinator.swarmctl(&["repertoire", "3@4"]).expect_success().json();
+    let individual =
+        |address: &str| coordinator.swarmctl(&["individual", address]).expect_success().json();
+    let mut experiments = BTreeSet::new();
+    for elite in found["elites"].as_array().unwrap() {
+        let address = elite["address"].as_str().unwrap();
+        let (id, place) = address.split_once('@').unwrap();
+        let (generation, _) = place.split_once('/').unwrap();
+        let born = match generation.parse::<u64>().unwrap() {
+            0 | 1 => "1",
+            2 | 3 => "2",
+            _ => "3",
+        };
+        assert_eq!(id, born, "{address}");
+        if experiments.insert(id) {
+            individual(address);
+        }
+        if elite["shown"] == true {
+            let of_cell = format!("3@4/cell({},{})", elite["cell"][0], elite["cell"][1]);
+            assert_eq!(individual(&of_cell), individual(address));
+            coordinator.swarmctl(&["lineage", &of_cell]).expect_success();
+        }
+    }
+    assert_eq!(experiments, BTreeSet::from(["1", "2", "3"]));
 }
 
 #[test]

@@ -30,10 +30,7 @@ pub async fn experiment_at(
     Ok((experiment, generation))
 }
 
-/// The address of an elite. A fork's parent has the elites that were born before the fork.
-pub fn address(experiment: &Experiment, elite: &Elite) -> String {
-    let fork = experiment.forked_from.as_ref();
-    let fork = fork.filter(|fork| elite.generation <= fork.generation);
-    let id = fork.map_or(experiment.id, |fork| fork.experiment_id);
-    format!("{id}@{}/{}", elite.generation, elite.individual)
+/// The address of an elite, in the experiment in which it was born.
+pub fn address(elite: &Elite) -> String {
+    format!("{}@{}/{}", elite.experiment_id, elite.generation, elite.individual)
 }

@@ -163,7 +163,7 @@ impl Remote for FrontArgs {
                 progress.print(&csv_at(&paths(&names), &document(&experiment, &found).elites))
             }
             OutputFormat::Table | OutputFormat::Wide => {
-                let table = table(&experiment, &found);
+                let table = table(&found);
                 progress.print_parts(&[Part::Table(table), Part::text(summary(&found))])
             }
         }
@@ -209,7 +209,7 @@ fn document(experiment: &Experiment, found: &GetFrontResponse) -> Document {
     let aims = &found.aims;
     let point = |values: &[f64]| aims.iter().map(name).zip(values.iter().copied()).collect();
     let elite = |(index, elite): (u32, &Elite)| EliteDocument {
-        address: address(experiment, elite),
+        address: address(elite),
         shown: found.shown.contains(&index),
         trials: elite.trials,
         fitness: elite.fitness,
@@ -262,7 +262,7 @@ fn headings(aims: &[Aim]) -> Vec<String> {
 }
 
 /// The front, best fitness first.
-fn table(experiment: &Experiment, found: &GetFrontResponse) -> Table {
+fn table(found: &GetFrontResponse) -> Table {
     let fitness = if is_judged(found) { "judged" } else { "fitness" };
     let headings = headings(&found.aims);
     let columns = [Column::number(fitness)]
@@ -278,7 +278,7 @@ fn table(experiment: &Experiment, found: &GetFrontResponse) -> Table {
     for (elite, fitness, aims) in shown {
         let mut row = vec![number(fitness, 6)];
         row.extend(aims.iter().map(|value| number(*value, 4)));
-        row.extend([elite.trials.to_string(), address(experiment, elite)]);
+        row.extend([elite.trials.to_string(), address(elite)]);
         table.push(row);
     }
     table

@@ -56,12 +56,16 @@ Examples:
 impl Remote for IndividualArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let address = connection.resolve(&self.address).await?;
-        let (experiment, _) = connection.stored(address.experiment.0).await?;
+        let (mut experiment, _) = connection.stored(address.experiment.0).await?;
         let mut answer = connection.individuals(address, 0).await?;
         let mut individuals = answer.individuals;
         while let Some(next) = answer.next_individual {
             answer = connection.individuals(address, next).await?;
             individuals.append(&mut answer.individuals);
+        }
+        if let (Who::Cell(..), [elite]) = (address.who, &individuals[..]) {
+            // The elite of a fork may have been born in the parent.
+            (experiment, _) = connection.stored(elite.experiment_id).await?;
         }
         match (address.who, &individuals[..]) {
             (Who::Generation(generation), all) => {

@@ -111,12 +111,13 @@ struct ParentDocument {
 impl Remote for LineageArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let address = connection.resolve(&self.address).await?;
-        let GetLineageResponse { populations } = connection.lineage(address, self.depth).await?;
+        let GetLineageResponse { populations, experiment_id } =
+            connection.lineage(address, self.depth).await?;
         match (self.dot, progress.is_json()) {
             (true, true) => Err(Error::option("--dot", "prints no JSON; leave out --output json")),
             (true, false) => progress.print(&draw::graph(&populations)),
             (false, true) => progress.print_document(&LineageDocument::new(address, &populations)),
-            (false, false) => progress.print(&draw::trees(&populations, address.experiment.0)),
+            (false, false) => progress.print(&draw::trees(&populations, experiment_id)),
         }
     }
 }

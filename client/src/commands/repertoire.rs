@@ -164,7 +164,7 @@ impl Remote for RepertoireArgs {
                 progress.print(&csv_at(&paths(&names), &document(&experiment, &found).elites))
             }
             OutputFormat::Table | OutputFormat::Wide => {
-                let table = table(&experiment, &found);
+                let table = table(&found);
                 progress.print_parts(&[Part::Table(table), Part::text(summary(&found))])
             }
         }
@@ -202,7 +202,7 @@ fn document(experiment: &Experiment, found: &GetRepertoireResponse) -> Document 
     let axes = &found.axes;
     let point = |values: &[f64]| axes.iter().map(name).zip(values.iter().copied()).collect();
     let elite = |(index, elite): (u32, &Elite)| EliteDocument {
-        address: address(experiment, elite),
+        address: address(elite),
         shown: found.shown.contains(&index),
         trials: elite.trials,
         fitness: elite.fitness,
@@ -252,7 +252,7 @@ fn shown(found: &GetRepertoireResponse) -> impl Iterator<Item = (&Elite, &[u32],
     })
 }
 
-fn table(experiment: &Experiment, found: &GetRepertoireResponse) -> Table {
+fn table(found: &GetRepertoireResponse) -> Table {
     let fitness = if found.corrected.is_some() { "judged" } else { "fitness" };
     let columns = [Column::new("cell"), Column::number(fitness)].into_iter();
     let columns = columns
@@ -263,7 +263,7 @@ fn table(experiment: &Experiment, found: &GetRepertoireResponse) -> Table {
         let cell: Vec<String> = cell.iter().map(ToString::to_string).collect();
         let mut row = vec![cell.join(","), number(fitness, 6)];
         row.extend(descriptors.iter().map(|value| number(*value, 4)));
-        row.extend([elite.trials.to_string(), address(experiment, elite)]);
+        row.extend([elite.trials.to_string(), address(elite)]);
         table.push(row);
     }
     table

@@ -35,5 +35,5 @@ pub fn lineage() -> GetLineageResponse {
         ancestor(0, 4, 1.0, 9),
     ];
     let lineage = PopulationLineage { population: "p1".into(), ancestors };
-    GetLineageResponse { populations: vec![lineage] }
+    GetLineageResponse { populations: vec![lineage], experiment_id: 3 }
 }

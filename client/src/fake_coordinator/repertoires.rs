@@ -14,7 +14,8 @@ pub fn repertoire(generation: Option<u64>) -> GetRepertoireResponse {
         high: 1.0,
         cells,
     };
-    let elite = |individual, [x, y]: [f64; 2], fitness: f64| {
+    // The last one was born before a fork.
+    let elite = |experiment_id, individual, [x, y]: [f64; 2], fitness: f64| {
         let cell = vec![(4.0 * x) as u32, (2.0 * y) as u32];
         let judged = JudgedElite {
             fitness: fitness - 0.25,
@@ -29,6 +30,7 @@ pub fn repertoire(generation: Option<u64>) -> GetRepertoireResponse {
             descriptors: vec![x, y],
             trials: 6,
             judged: is_judged.then_some(judged),
+            experiment_id,
         }
     };
     let corrected = CorrectedFigures { qd_score: 1.25, coverage: 0.25, stay: 1.0 / 3.0 };
@@ -36,9 +38,9 @@ pub fn repertoire(generation: Option<u64>) -> GetRepertoireResponse {
         generation: generation.unwrap_or(2),
         axes: vec![axis("order", 4), axis("together", 2)],
         elites: vec![
-            elite(5, [0.125, 0.25], 0.5),
-            elite(2, [0.125, 0.75], 1.0),
-            elite(7, [0.75, 0.75], 1.25),
+            elite(3, 5, [0.125, 0.25], 0.5),
+            elite(3, 2, [0.125, 0.75], 1.0),
+            elite(1, 7, [0.75, 0.75], 1.25),
         ],
         shown: if is_judged { vec![1, 2] } else { vec![0, 1, 2] },
         corrected: is_judged.then_some(corrected),

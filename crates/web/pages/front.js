@@ -75,12 +75,12 @@ export function frontPanel(id) {
   };
   const play = () => {
     const it = elites[cursor];
-    if (it) location.assign(`/replay/${id}@${it.generation}/${it.individual}`);
+    if (it) location.assign(`/replay/${it.experiment}@${it.generation}/${it.individual}`);
   };
 
   const take = (answer) => {
     found = answer;
-    elites = found.shown.map(([fitness, aims, generation, individual]) => ({ fitness, aims, generation, individual }));
+    elites = found.shown.map(([fitness, aims, generation, individual, experiment]) => ({ fitness, aims, generation, individual, experiment }));
     elites.sort((a, b) => a.aims[0] - b.aims[0] || a.fitness - b.fitness);
     cursor = null;
     draw();
@@ -114,7 +114,7 @@ export function frontPanel(id) {
   /** The elites on the front. */
   const table = () => [
     ["address", "fitness", ...found.aims.map(({ measure, of }) => `${measure}_${of}`)],
-    ...elites.map(({ fitness, aims, generation, individual }) => [`${id}@${generation}/${individual}`, fitness, ...aims]),
+    ...elites.map(({ fitness, aims, generation, individual, experiment }) => [`${experiment}@${generation}/${individual}`, fitness, ...aims]),
   ];
 
   askDuringRun(node, `/api/experiments/${id}/front`, { take, note, isDone: () => found?.figures?.stay !== null });

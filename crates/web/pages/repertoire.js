@@ -93,17 +93,17 @@ export function repertoirePanel(id) {
 
   const play = () => {
     const it = at(cursor);
-    if (it) location.assign(`/replay/${id}@${it.generation}/${it.individual}`);
+    if (it) location.assign(`/replay/${it.experiment}@${it.generation}/${it.individual}`);
   };
 
   const take = (answer) => {
     found = answer;
     elites = new Map();
-    for (const [cell, fitness, descriptors, generation, individual] of found.shown) {
+    for (const [cell, fitness, descriptors, generation, individual, experiment] of found.shown) {
       const place = [cell[0], cell[1] ?? 0];
       const before = elites.get(key(...place));
       // With more than two descriptors, several elites share a cell of the picture.
-      if (!before || before.fitness < fitness) elites.set(key(...place), { cell: place, fitness, descriptors, generation, individual });
+      if (!before || before.fitness < fitness) elites.set(key(...place), { cell: place, fitness, descriptors, generation, individual, experiment });
     }
     range = extremes([...elites.values()].map((it) => it.fitness));
     draw();
@@ -143,7 +143,7 @@ export function repertoirePanel(id) {
   /** The shown elites. */
   const table = () => [
     ["address", "fitness", ...found.axes.map(({ measure, of }) => `${measure}_${of}`)],
-    ...found.shown.map(([, fitness, descriptors, generation, individual]) => [`${id}@${generation}/${individual}`, fitness, ...descriptors]),
+    ...found.shown.map(([, fitness, descriptors, generation, individual, experiment]) => [`${experiment}@${generation}/${individual}`, fitness, ...descriptors]),
   ];
 
   askDuringRun(node, `/api/experiments/${id}/repertoire`, { take, note, isDone: () => !found || found.corrected });

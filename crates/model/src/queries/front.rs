@@ -7,9 +7,9 @@ use tonic::Status;
 use crate::ids::ExperimentId;
 
 use super::{
-    QueryError, Reader, StoredGeneration, config,
+    QueryError, Reader, config,
     generation::RepeatedGeneration,
-    repertoire::{elite, name_of, read_of},
+    repertoire::{StoredElites, name_of, read_of},
 };
 
 impl Reader {
@@ -25,7 +25,8 @@ impl Reader {
     }
 }
 
-fn message(stored: &StoredGeneration, reference: &[f64]) -> Result<GetFrontResponse, QueryError> {
+fn message(elites: &StoredElites, reference: &[f64]) -> Result<GetFrontResponse, QueryError> {
+    let stored = &elites.generation;
     let aims = config(&stored.experiment, stored.of.generation)?.algorithm.aims;
     let reference = check(reference, &aims)?;
     let RepeatedGeneration { told, after, .. } = stored.repeat()?;
@@ -36,7 +37,7 @@ fn message(stored: &StoredGeneration, reference: &[f64]) -> Result<GetFrontRespo
     Ok(GetFrontResponse {
         generation: stored.of.generation,
         aims: aims.iter().map(aim).collect(),
-        elites: front.elites.iter().map(elite).collect(),
+        elites: front.elites.iter().map(|elite| elites.message(elite)).collect(),
         shown: front.shown().into_iter().map(|place| place as u32).collect(),
         figures: front.figures(reference).map(|figures| v1::FrontFigures {
             hypervolume: figures.hypervolume,

@@ -108,7 +108,10 @@ impl StoredLineage {
             population,
             ancestors: ancestors.into_iter().map(ancestor).collect(),
         };
-        Ok(GetLineageResponse { populations: populations.into_iter().map(lineage).collect() })
+        Ok(GetLineageResponse {
+            populations: populations.into_iter().map(lineage).collect(),
+            experiment_id: id.0,
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Queries use only the store, so they need no running driver and cannot slow one down.
 
+mod ancestry;
 mod bundle;
 mod calls;
 mod dynamics;

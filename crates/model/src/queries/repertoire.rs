@@ -12,7 +12,8 @@ use tonic::Status;
 use crate::{Address, Cell, Who, ids::ExperimentId, store::Store};
 
 use super::{
-    QueryError, Reader, StoredGeneration, config, experiment, generation::RepeatedGeneration,
+    QueryError, Reader, StoredGeneration, ancestry::Ancestry, config, experiment,
+    generation::RepeatedGeneration,
 };
 
 impl Reader {
@@ -32,9 +33,36 @@ impl Reader {
         let Who::Cell(generation, cell) = address.who else { return Ok(address) };
         let id = address.experiment;
         let read = move |store: &_| read(store, id, Some(generation));
-        let (generation, individual) =
-            self.reconstruct(read, move |stored| elite_of(&stored, cell)).await?;
-        Ok(Address { who: Who::Individual(generation, individual), ..address })
+        self.reconstruct(read, move |stored| elite_of(&stored, cell)).await
+    }
+}
+
+/// The stored data of the elites after a generation.
+#[derive(Debug)]
+pub(super) struct StoredElites {
+    /// The generation.
+    pub generation: StoredGeneration,
+    /// The experiments in which they were born.
+    ancestry: Ancestry,
+}
+
+impl StoredElites {
+    /// The message about an elite.
+    pub fn message(&self, elite: &EliteReport<'_>) -> v1::Elite {
+        v1::Elite {
+            generation: elite.generation,
+            individual: elite.individual,
+            cell: elite.cell.clone(),
+            fitness: elite.fitness,
+            descriptors: elite.descriptors.clone(),
+            trials: elite.n_trials,
+            judged: elite.judged.as_ref().map(|judged| v1::JudgedElite {
+                fitness: judged.fitness,
+                descriptors: judged.descriptors.clone(),
+                cell: judged.cell.clone(),
+            }),
+            experiment_id: self.ancestry.experiment_of(elite.generation).0,
+        }
     }
 }
 
@@ -42,26 +70,28 @@ fn read(
     store: &Store,
     id: ExperimentId,
     generation: Option<u64>,
-) -> Result<StoredGeneration, QueryError> {
+) -> Result<StoredElites, QueryError> {
     read_of(store, id, generation, LearnsFrom::Descriptors)?
         .map_err(|algorithm| QueryError::NoRepertoire { experiment: id, algorithm })
 }
 
-/// A generation of an experiment whose algorithm learns in this way; otherwise the name of its
+/// The elites of an experiment whose algorithm learns in this way; otherwise the name of its
 /// algorithm.
 pub(super) fn read_of(
     store: &Store,
     id: ExperimentId,
     generation: Option<u64>,
     learns_from: LearnsFrom,
-) -> Result<Result<StoredGeneration, String>, QueryError> {
+) -> Result<Result<StoredElites, String>, QueryError> {
     let found = experiment(store, id)?;
     let algorithm = AlgorithmDescription::find(ALGORITHMS, &found.summary.algorithm);
     if !algorithm.is_some_and(|algorithm| algorithm.learns_from == learns_from) {
         return Ok(Err(found.summary.algorithm.clone()));
     }
     let latest = found.n_generations().saturating_sub(1);
-    StoredGeneration::read(store, id, generation.unwrap_or(latest)).map(Ok)
+    let ancestry = Ancestry::read(store, &found)?;
+    let generation = StoredGeneration::read(store, id, generation.unwrap_or(latest))?;
+    Ok(Ok(StoredElites { generation, ancestry }))
 }
 
 /// Recomputes a repertoire, and passes it to `then`; CPU-bound.
@@ -77,20 +107,26 @@ fn with_repertoire<T>(
     then(&repertoire)
 }
 
-/// The birth of the fittest elite in a cell, by evidence.
-fn elite_of(stored: &StoredGeneration, cell: Cell) -> Result<(u64, u32), QueryError> {
+/// The address of the fittest elite in a cell, by evidence.
+fn elite_of(stored: &StoredElites, cell: Cell) -> Result<Address, QueryError> {
+    let StoredElites { generation: stored, ancestry } = stored;
     with_repertoire(stored, |repertoire| {
         let mut elites = repertoire.by_cell().into_iter();
         let found = elites.find(|elite| elite.cell == cell.indices());
-        found.map(|elite| (elite.generation, elite.individual)).ok_or(QueryError::EmptyCell {
+        let elite = found.ok_or(QueryError::EmptyCell {
             experiment: stored.experiment.id,
             generation: stored.of.generation,
             cell,
+        })?;
+        Ok(Address {
+            experiment: ancestry.experiment_of(elite.generation),
+            who: Who::Individual(elite.generation, elite.individual),
         })
     })
 }
 
-fn message(stored: &StoredGeneration) -> Result<GetRepertoireResponse, QueryError> {
+fn message(elites: &StoredElites) -> Result<GetRepertoireResponse, QueryError> {
+    let stored = &elites.generation;
     let config = config(&stored.experiment, stored.of.generation)?;
     with_repertoire(stored, |repertoire| {
         let figures = repertoire.figures();
@@ -101,7 +137,7 @@ fn message(stored: &StoredGeneration) -> Result<GetRepertoireResponse, QueryErro
         Ok(GetRepertoireResponse {
             generation: stored.of.generation,
             axes: config.algorithm.descriptors.iter().map(axis).collect(),
-            elites: repertoire.elites.iter().map(elite).collect(),
+            elites: repertoire.elites.iter().map(|elite| elites.message(elite)).collect(),
             shown: shown.into_iter().map(|elite| places[&born(elite)]).collect(),
             corrected: figures.map(|figures| CorrectedFigures {
                 qd_score: figures.qd_score,
@@ -123,21 +159,5 @@ pub(super) fn name_of(value: impl Into<ParameterValue>) -> String {
     match value.into() {
         ParameterValue::Name(name) => name,
         _ => String::new(),
-    }
-}
-
-pub(super) fn elite(elite: &EliteReport<'_>) -> v1::Elite {
-    v1::Elite {
-        generation: elite.generation,
-        individual: elite.individual,
-        cell: elite.cell.clone(),
-        fitness: elite.fitness,
-        descriptors: elite.descriptors.clone(),
-        trials: elite.n_trials,
-        judged: elite.judged.as_ref().map(|judged| v1::JudgedElite {
-            fitness: judged.fitness,
-            descriptors: judged.descriptors.clone(),
-            cell: judged.cell.clone(),
-        }),
     }
 }

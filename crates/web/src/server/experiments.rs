@@ -107,8 +107,8 @@ pub async fn dynamics(
 }
 
 /// The latest repertoire: its axes, its figures once the elites are judged, and for each cell that
-/// has an elite its indices, fitness, descriptors, and the generation and index of its birth.
-/// Fitness, descriptors and cells are judged ones, if there are any.
+/// has an elite its indices, fitness, descriptors, and the generation, index and experiment of its
+/// birth. Fitness, descriptors and cells are judged ones, if there are any.
 pub async fn repertoire(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -122,7 +122,7 @@ pub async fn repertoire(
             Some(judged) => (&judged.cell, judged.fitness, &judged.descriptors),
             None => (&elite.cell, elite.fitness, &elite.descriptors),
         };
-        json!([cell, fitness, descriptors, elite.generation, elite.individual])
+        json!([cell, fitness, descriptors, elite.generation, elite.individual, elite.experiment_id])
     });
     let axes = found.axes.iter().map(|axis| {
         json!({
@@ -143,7 +143,8 @@ pub async fn repertoire(
 }
 
 /// The latest front: its aims, its figures, and for each elite on it fitness, aims, and the
-/// generation and index of its birth. Fitness and aims are judged ones, if there are any.
+/// generation, index and experiment of its birth. Fitness and aims are judged ones, if there are
+/// any.
 pub async fn front(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -156,7 +157,7 @@ pub async fn front(
             Some(judged) => (judged.fitness, &judged.descriptors),
             None => (elite.fitness, &elite.descriptors),
         };
-        json!([fitness, aims, elite.generation, elite.individual])
+        json!([fitness, aims, elite.generation, elite.individual, elite.experiment_id])
     });
     let aims = found
         .aims

@@ -53,10 +53,13 @@ pub struct Subject {
 
 impl Subject {
     pub async fn find(shared: &Shared, address: &str) -> Result<Self, Problem> {
-        let experiment = address.split('@').next().and_then(|id| id.parse().ok());
-        let experiment =
-            experiment.ok_or_else(|| Problem::bad(format!("`{address}` names no genotype")))?;
+        let id: Option<u64> = address.split('@').next().and_then(|id| id.parse().ok());
+        if id.is_none() {
+            return Err(Problem::bad(format!("`{address}` names no genotype")));
+        }
         let individual = shared.reader.individual(address).await?;
+        // The elite of a cell of a fork may have been born in the parent.
+        let experiment = individual.experiment_id;
         let found = shared.experiment(experiment).await?;
         let simulation =
             found.experiment.map(|experiment| experiment.simulation).unwrap_or_default();
