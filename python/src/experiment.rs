@@ -32,6 +32,12 @@ pub struct Experiment {
     warnings: Vec<String>,
 }
 
+/// A file's text without comments and trailing commas, for a parser of JSON; lines stay.
+#[pyfunction]
+pub fn plain(text: &str) -> String {
+    experiment_file::plain(text).into_owned()
+}
+
 /// The path of the script that a file's text names; none if it has no script, or contains it.
 #[pyfunction]
 pub fn script_path(text: &str) -> Option<String> {

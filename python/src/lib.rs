@@ -25,7 +25,7 @@ mod _core {
     use crate::{
         database::Database,
         evolution::{Evolution, Reevaluation, advice, algorithms},
-        experiment::{Experiment, inline_script, script_path},
+        experiment::{Experiment, inline_script, plain, script_path},
         fitness_log::fitness_log,
         genes::encode_genes,
         judging::judge,

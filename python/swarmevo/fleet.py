@@ -33,14 +33,16 @@ T = TypeVar("T")
 
 REQUEST_LEN_MAX = 7 << 20
 """Bytes of genes in one request; a coordinator accepts 8 MiB."""
+IN_FLIGHT_MAX = 8
+"""Requests of an evaluation that a coordinator has at a time: it holds 256 MiB of all clients, and refuses the rest."""
 VALUES_MAX = 1 << 21
 """Genotypes times trials in one request."""
 DEADLINE_S = 30.0
 PAUSE_S = 1.0
 SILENCE_MAX_S = 2.0
 """The longest silent wait for workers."""
-TRANSIENT = ("UNAVAILABLE", "DEADLINE_EXCEEDED", "ABORTED")
-"""Transient errors; every request can be repeated."""
+TRANSIENT = ("UNAVAILABLE", "DEADLINE_EXCEEDED", "ABORTED", "RESOURCE_EXHAUSTED")
+"""Transient errors; every request can be repeated. The last one: the coordinator has too much to do."""
 ENDS = ("completed", "failed", "cancelled")
 
 
@@ -60,7 +62,7 @@ def connect(
     the settings file, else ``http://127.0.0.1:7700`` without a token.
 
     ``patience``: the time in seconds for which the client repeats requests while the coordinator
-    is unreachable.
+    is unreachable or has too much to do.
     """
     if coordinator is not None:
         arguments.name_of(coordinator, "coordinator")
@@ -217,7 +219,7 @@ class Client(Records):
             request | {"genotypes": [message.FromString(it) for it in _core.encode_genes(part)]}
             for part in parts
         ]
-        answers = self._all_at_once("EvaluationService", "EvaluateFitness", asked)
+        answers = self._in_parts("EvaluationService", "EvaluateFitness", asked)
         fitness = np.array([it.values for answer in answers for it in answer.fitness])
         return fitness[0] if is_one else fitness
 
@@ -255,21 +257,23 @@ class Client(Records):
         return stub(path, request_class.SerializeToString, response_class.FromString), request_class
 
     def _request(self, service: str, name: str, **request: Any) -> Any:
-        """The answer to one request, repeated while the coordinator is unreachable."""
+        """The answer to one request, repeated after transient errors."""
         call, request_class = self._call_of(service, name)
         message = request_class(**request)
         return self._patiently(
             lambda: call(message, metadata=self._metadata, timeout=DEADLINE_S)
         )
 
-    def _all_at_once(self, service: str, name: str, requests: list[dict[str, Any]]) -> list[Any]:
-        """Answers to requests without a time limit, sent together."""
+    def _in_parts(self, service: str, name: str, requests: list[dict[str, Any]]) -> list[Any]:
+        """Answers to requests without a time limit, some of which are under way together."""
         call, request_class = self._call_of(service, name)
         messages = [request_class(**request) for request in requests]
-        waiting = [call.future(it, metadata=self._metadata) for it in messages]
+        waiting: list[Any] = []
         try:
-            answers = []
+            answers: list[Any] = []
             for i, message in enumerate(messages):
+                unsent = messages[len(waiting) : i + IN_FLIGHT_MAX]
+                waiting += [call.future(it, metadata=self._metadata) for it in unsent]
 
                 def answer(i: int = i, message: Any = message) -> Any:
                     try:
@@ -358,7 +362,7 @@ class FleetRun(RecordedRun):
                         elif kind == "state_changed":
                             is_over = protocol.states().get(event.state_changed.state) in ENDS
             except FleetError as error:
-                if error.code not in (*TRANSIENT, "RESOURCE_EXHAUSTED"):
+                if error.code not in TRANSIENT:
                     raise
             finally:
                 events.cancel()

@@ -8,8 +8,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
+
+from . import _core
 
 DEFAULT_COORDINATOR = "http://127.0.0.1:7700"
 TOKEN_VARIABLE = "SWARM_CLIENT_TOKEN"
@@ -94,12 +98,7 @@ class Settings:
         path = Path(named) if named else Path(directory) / "swarmevo" / "config.json"
         if not named and not path.is_file():
             return cls()
-        found = json.loads(path.read_text(encoding="utf-8-sig"))
-        names = {it.name.replace("_", "-"): it.name for it in fields(cls)}
-        unknown = [key for key in found if key not in names]
-        if unknown:
-            raise ValueError(f"{path}: unknown key `{unknown[0]}`; known: {', '.join(names)}")
-        settings = cls(**{names[key]: value for key, value in found.items()})
+        settings = cls(**_read(path))
 
         def beside(file: str | None) -> str | None:
             return None if file is None else str(path.parent / file)
@@ -111,3 +110,34 @@ class Settings:
             tls_cert=beside(settings.tls_cert),
             tls_key=beside(settings.tls_key),
         )
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """The settings in a file by the names of the fields. ValueError with file and line if it has a mistake."""
+    try:
+        # Comments and trailing commas are as in experiment files.
+        text = _core.plain(path.read_text(encoding="utf-8-sig"))
+        found = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{path}: line {error.lineno}: {error.msg}") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: it is not UTF-8") from None
+    if not isinstance(found, dict):
+        raise ValueError(f"{path}: line 1: settings are an object, not {type(found).__name__}")
+    names = {it.name.replace("_", "-"): it.name for it in fields(Settings)}
+    for key, value in found.items():
+        line = _line_of(key, text)
+        if key not in names:
+            raise ValueError(f"{path}: line {line}: unknown key `{key}`; known: {', '.join(names)}")
+        if key == "plaintext":
+            if not isinstance(value, bool):
+                raise ValueError(f"{path}: line {line}: `{key}` is true or false, not {type(value).__name__}")
+        elif not isinstance(value, str) and value is not None:
+            raise ValueError(f"{path}: line {line}: `{key}` is text, not {type(value).__name__}")
+    return {names[key]: value for key, value in found.items()}
+
+
+def _line_of(key: str, text: str) -> int:
+    """The line of a key of an object, from 1."""
+    found = re.search(rf"{re.escape(json.dumps(key, ensure_ascii=False))}\s*:", text)
+    return 1 + text.count("\n", 0, found.start() if found else 0)

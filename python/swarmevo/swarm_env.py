@@ -17,6 +17,8 @@ from .trials import TrialSet
 
 GENERATIONS_MAX = 10_000_000
 """Number of trial sets from which seeds choose."""
+CHOOSING = ("SoftmaxDecoding", "FirstToSpike")
+"""Decodings that choose one of the neurons: of an LED, each neuron is a colour."""
 
 
 class SwarmEnv(ParallelEnv[str, NDArray[np.float32], dict[str, Any]]):  # type: ignore[misc]
@@ -163,7 +165,7 @@ def _n_colours(topology: dict[str, Any]) -> int:
     """Colours of LEDs, off included, that the network can choose from."""
     n_colours = 2
     for name, output in topology["outputs"].items():
-        chooses = topology["decoding"].get(name, {}).get("scheme") == "SoftmaxDecoding"
+        chooses = topology["decoding"].get(name, {}).get("scheme") in CHOOSING
         if output["actuator"] == "led_actuator" and chooses:
             n_colours = max(n_colours, topology["ensembles"][output["ensemble"]]["n"])
     return n_colours

@@ -275,6 +275,18 @@ def test_a_bundle_is_exported_once_and_verified(ran):
     drive(server(ran), script)
 
 
+def test_a_bundle_is_verified_here_even_if_a_fleet_is_in_the_environment(ran, monkeypatch):
+    nobody = "http://127.0.0.1:9"
+    monkeypatch.setenv("SWARM_COORDINATOR", nobody)
+
+    async def script(call):
+        await call.facts("export", experiment="1", file="here.zip")
+        proven = await call.facts("verify", file="here.zip", generations=1)
+        assert "simulation" in {it["claim"] for it in proven["proven"]}
+
+    drive(server(ran, coordinator=nobody), script)
+
+
 def test_errors_of_experiments_that_do_not_exist_name_the_next_step(tmp_path, ran):
     async def nothing(call):
         assert "`run`" in (await call.error("experiments"))["next"]

@@ -24,7 +24,7 @@ class Nobody:
 
     def __init__(self):
         self.client = object.__new__(swarmevo.Client)
-        self.client._call = self.client._all_at_once = self.call
+        self.client._call = self.client._in_parts = self.call
         self.client.patience = 0
         self.archive = object.__new__(swarmevo.Archive)
         self.archive._call = self.call

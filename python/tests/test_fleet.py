@@ -13,10 +13,11 @@ import pytest
 
 import swarmevo
 from processes import fleet
-from swarmevo import ExperimentError, FleetError, TrialSet
+from swarmevo import ExperimentError, FleetError, TrialSet, protocol
+from swarmevo.fleet import IN_FLIGHT_MAX
 from swarmevo.settings import Settings
 
-pytest.importorskip("grpc")
+grpc = pytest.importorskip("grpc")
 pytest.importorskip("pandas")
 
 
@@ -156,6 +157,74 @@ def test_large_populations_travel_in_parts(client, quickstart, genotypes, monkey
     assert np.array_equal(fitness, quickstart.evaluate(genotypes, 3))
 
 
+class Crowded(grpc.RpcError):
+    """The refusal of a coordinator that holds as much as it may."""
+
+    def code(self):
+        return grpc.StatusCode.RESOURCE_EXHAUSTED
+
+    def details(self):
+        return "256 MiB of requests wait; try again later"
+
+
+class Answer:
+    """Stands for a request that is under way, until somebody takes its answer or its refusal."""
+
+    def __init__(self, under_way, fitness):
+        self.under_way, self.fitness = under_way, fitness
+        under_way.append(self)
+
+    def result(self, timeout=None):
+        self.cancel()
+        if self.fitness is None:
+            raise Crowded
+        return protocol.message("EvaluateFitnessResponse")(fitness=[{"values": it} for it in self.fitness])
+
+    def cancel(self):
+        if self in self.under_way:
+            self.under_way.remove(self)
+
+
+class Evaluations:
+    """Stands for the call of a coordinator that refuses some requests. The first gene of an individual is its
+    fitness."""
+
+    def __init__(self, refusals):
+        self.refusals, self.under_way, self.most, self.asked = refusals, [], 0, 0
+
+    def future(self, request, metadata=None):
+        self.asked += 1
+        refused = self.asked in self.refusals
+        answer = Answer(self.under_way, None if refused else [[it.values[0]] for it in request.genotypes])
+        self.most = max(self.most, len(self.under_way))
+        return answer
+
+
+def asking(experiment, monkeypatch, refusals=(), patience=60.0):
+    """A client of such a coordinator, which sends two genotypes in a request, and sixty genotypes."""
+    monkeypatch.setattr("swarmevo.fleet.REQUEST_LEN_MAX", 2 * (8 * experiment.n_genes + 16))
+    monkeypatch.setattr("swarmevo.fleet.PAUSE_S", 0.0)
+    client, call = swarmevo.connect("http://127.0.0.1:9", patience=patience), Evaluations(refusals)
+    monkeypatch.setattr(client, "_call_of", lambda *_: (call, protocol.message("EvaluateFitnessRequest")))
+    return client, call, np.random.default_rng(3).random((60, experiment.n_genes))
+
+
+def test_a_large_population_has_few_parts_under_way(quickstart, monkeypatch):
+    client, call, many = asking(quickstart, monkeypatch)
+    assert np.array_equal(client.evaluate(quickstart, many, trials=1), many[:, :1])
+    assert call.asked == 30 and call.most == IN_FLIGHT_MAX and not call.under_way
+
+
+def test_parts_that_a_busy_coordinator_refuses_are_repeated_while_patience_lasts(quickstart, monkeypatch):
+    client, call, many = asking(quickstart, monkeypatch, refusals=(1, 5, 9, 10))
+    assert np.array_equal(client.evaluate(quickstart, many, trials=1), many[:, :1])
+    assert call.asked == 34 and call.most == IN_FLIGHT_MAX
+    client, call, many = asking(quickstart, monkeypatch, refusals=(5,), patience=0)
+    with pytest.raises(FleetError, match="256 MiB") as refused:
+        client.evaluate(quickstart, many, trials=1)
+    assert refused.value.code == "RESOURCE_EXHAUSTED" and not call.under_way
+
+
 def test_anybodys_optimiser_drives_the_fleet(client, short, here):
     """Drives an evolution from here, with the same results as a coordinator's run."""
     run = swarmevo.evolve(
@@ -236,6 +305,33 @@ def test_settings_are_found_as_swarmctl_finds_them(tmp_path, monkeypatch):
     monkeypatch.setenv("SWARM_CONFIG", str(tmp_path / "absent.json"))
     with pytest.raises(FileNotFoundError):
         Settings.find(Settings())
+
+
+def test_settings_may_have_comments_and_trailing_commas(tmp_path, monkeypatch):
+    monkeypatch.delenv("SWARM_COORDINATOR", raising=False)
+    file = tmp_path / "config.json"
+    file.write_text('{\n  // The usual place.\n  "coordinator": "http://file:1", /* "x": */\n}\n')
+    monkeypatch.setenv("SWARM_CONFIG", str(file))
+    assert Settings.find(Settings()).address == "http://file:1"
+
+
+@pytest.mark.parametrize(
+    ("text", "mistake"),
+    [
+        ("{\n  // \"plaintext\": 1\n  \"plaintext\": 1,\n}", "line 3: `plaintext` is true or false, not int"),
+        ('{\n\n  "coordinator": 7700}', "line 3: `coordinator` is text, not int"),
+        ('{\n  "coordinater": "http://h:1"}', "line 2: unknown key `coordinater`; known: coordinator, token-file"),
+        ("{\n  \"coordinator\" \"x\"}", "line 2: Expecting ':' delimiter"),
+        ("[]", "line 1: settings are an object, not list"),
+    ],
+)
+def test_a_mistake_in_the_settings_is_named_with_its_line(tmp_path, monkeypatch, text, mistake):
+    file = tmp_path / "config.json"
+    file.write_text(text)
+    monkeypatch.setenv("SWARM_CONFIG", str(file))
+    with pytest.raises(ValueError) as refused:
+        swarmevo.connect()
+    assert str(refused.value).startswith(f"{file}: {mistake}") and type(refused.value) is ValueError
 
 
 def test_a_token_is_not_sent_unencrypted(monkeypatch):

@@ -83,6 +83,25 @@ def test_an_environment_is_the_experiment(quickstart):
     assert infos["robot_3"]["fitness"] == fitness.max() > 0 and total > 0
 
 
+@pytest.mark.parametrize(
+    ("name", "output", "ensemble", "scheme"),
+    [
+        ("quickstart", "shine", "OUT_LED", "SoftmaxDecoding"),
+        ("spiking/leader_selection_lif", "outB", "OUT_LED", "FirstToSpike"),
+    ],
+)
+def test_an_led_has_the_colours_from_which_the_network_chooses(name, output, ensemble, scheme):
+    pytest.importorskip("pettingzoo")
+    config = swarmevo.Experiment.from_file(CONFIGS / f"{name}.json").to_dict()
+    config["algorithm"]["evaluation_steps"] = 5
+    config["topology"]["ensembles"][ensemble]["n"] = 4
+    config["topology"]["decoding"][output] = {"scheme": scheme}
+    env = swarmevo.parallel_env(swarmevo.Experiment.from_dict(config))
+    env.reset(seed=1)
+    assert all(env.action_space(agent)["led"].n == 4 for agent in env.agents)
+    env.step({agent: env.action_space(agent).sample() | {"led": 3} for agent in env.agents})
+
+
 def test_traces_and_episodes_show_what_a_script_senses():
     config = swarmevo.Experiment.from_file(CONFIGS / "tasks" / "scent.json").to_dict()
     config["algorithm"]["evaluation_steps"] = 20

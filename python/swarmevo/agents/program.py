@@ -27,6 +27,9 @@ GRACE_S = 10.0
 """Time in which an interrupted program stores what is complete."""
 DATA = "swarm-data"
 """The data directory of small runs."""
+PLACES = ("SWARM_DATA_DIR", "SWARM_COORDINATOR")
+"""Variables that say where commands work. Only the arguments of a call may, because only they are what a person has
+permitted: with a coordinator in the environment, ``verify`` would compute on its fleet."""
 
 
 @dataclass
@@ -87,7 +90,7 @@ class Program:
         """Runs a command, and interrupts it when its time is over. ``on_line`` gets every object of an output
         with an object per line."""
         command = [swarmctl(), *args[:1], "--output=json", *args[1:]]
-        environment = {key: it for key, it in os.environ.items() if key != "SWARM_DATA_DIR"}
+        environment = {key: it for key, it in os.environ.items() if key not in PLACES}
         # A session of its own: Ctrl-C of a terminal is for this process.
         process = await anyio.open_process(command, cwd=self.directory, env=environment, start_new_session=True, stdin=subprocess.DEVNULL)
         done = Done(0)
