@@ -1,6 +1,12 @@
 //! Arguments that several commands share. Each command's own arguments are in its module.
 
-use std::{fmt::Display, ops::RangeInclusive, path::PathBuf, str::FromStr, thread};
+use std::{
+    fmt::{self, Display},
+    ops::RangeInclusive,
+    path::PathBuf,
+    str::FromStr,
+    thread,
+};
 
 use clap::Args as ClapArgs;
 use clap_complete::ArgValueCompleter;
@@ -30,6 +36,12 @@ pub struct Target {
 pub struct Label {
     pub key: String,
     pub value: String,
+}
+
+impl Display for Label {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.key, self.value)
+    }
 }
 
 impl FromStr for Label {
@@ -88,13 +100,26 @@ impl ExperimentArgs {
         }
     }
 
-    /// The words of a command line that name the experiment.
+    /// The words of a command line that make the same experiments.
     pub fn words(&self) -> Vec<String> {
-        match (&self.config, self.example) {
+        let Self { config, example, generations, seed: SeedArg { seed }, sweep, labels } = self;
+        let SweepArgs { seeds, set, group } = sweep;
+        let mut words = match (config, example) {
             (_, Some(example)) => vec!["--example".into(), example.name.into()],
             (Some(path), None) => vec![path.to_string_lossy().into_owned()],
             (None, None) => Vec::new(),
-        }
+        };
+        let given = [
+            generations.map(|number| ("--generations", number.to_string())),
+            seed.map(|seed| ("--seed", seed.to_string())),
+            seeds.as_ref().map(|seeds| ("--seeds", seeds.to_string())),
+            group.clone().map(|group| ("--group", group)),
+        ];
+        let changes = set.set.iter().map(|change| ("--set", change.clone()));
+        let labels = labels.iter().map(|label| ("--label", label.to_string()));
+        let options = given.into_iter().flatten().chain(changes).chain(labels);
+        words.extend(options.flat_map(|(option, value)| [option.to_owned(), value]));
+        words
     }
 
     /// The replacements.

@@ -101,11 +101,25 @@ mod tests {
     }
 
     #[test]
+    fn the_words_of_an_experiment_have_every_option_that_changes_it() {
+        for words in [
+            "a.json --generations 20 --seed 7 --set world.height=500 --set world.width=700",
+            "a.json --seeds 0..4,9 --group sizes --set algorithm.population_size=50,100",
+            "a.json --label user=ada --label purpose=thesis",
+        ] {
+            let args = parse(&format!("swarmctl run {words}")).unwrap();
+            let Command::Run(args) = args.command else { panic!() };
+            assert_eq!(args.experiment.words().join(" "), words);
+        }
+    }
+
+    #[test]
     fn an_example_stands_for_a_file() {
         for name in ["leader_selection_snes", "leader_selection"] {
             let line = format!("swarmctl run --example {name} --generations 3");
             let Command::Run(args) = parse(&line).unwrap().command else { panic!() };
-            assert_eq!(args.experiment.words(), ["--example", "leader_selection_snes"]);
+            let words = ["--example", "leader_selection_snes", "--generations", "3"];
+            assert_eq!(args.experiment.words(), words);
             let file = args.experiment.file().unwrap();
             assert_eq!(file.name().as_deref(), Some("leader_selection_snes"));
         }

@@ -4,6 +4,7 @@
 mod requests;
 
 use std::{
+    iter,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
@@ -32,7 +33,7 @@ use crate::{
     place::{Intent, Place},
     progress::Progress,
     settings::Settings,
-    waiting,
+    text, waiting,
 };
 
 /// How long a request is repeated before the coordinator counts as unreachable.
@@ -164,6 +165,13 @@ impl Connection {
     pub fn named_place(&self) -> Option<String> {
         let data_dir = self.data_dir().filter(|path| *path != Path::new(DEFAULT_DATA_DIR))?;
         Some(data_dir.display().to_string())
+    }
+
+    /// The line of a command that acts in the same place.
+    pub fn command(&self, words: &[&str]) -> String {
+        let words = iter::once("swarmctl").chain(words.iter().copied()).map(str::to_owned);
+        let place = self.named_place().map(|data_dir| ["--data-dir".to_owned(), data_dir]);
+        text::shell_command(words.chain(place.into_iter().flatten()))
     }
 
     /// Whether this process, and no other, computes experiments.

@@ -133,10 +133,12 @@ pub enum Error {
         reason: String,
     },
     /// The experiment has not ended within the time limit of `watch`.
-    #[error("experiment {id} has not ended; `swarmctl explain {id}` says what it waits for")]
+    #[error("experiment {id} has not ended; `{explain}` says what it waits for")]
     TimedOut {
         /// Number of the experiment.
         id: u64,
+        /// The command that explains it.
+        explain: String,
     },
     /// A database is damaged.
     #[error("{0}")]
@@ -265,7 +267,7 @@ impl Error {
             | Self::Denied { address, .. }
             | Self::Tls { address, .. }
             | Self::Foreign { address, .. } => Some(address.clone()),
-            Self::Failed { id, .. } | Self::Cancelled { id, .. } | Self::TimedOut { id } => {
+            Self::Failed { id, .. } | Self::Cancelled { id, .. } | Self::TimedOut { id, .. } => {
                 Some(id.to_string())
             }
             Self::Write { what, .. } => Some(what.clone()),

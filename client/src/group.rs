@@ -1,5 +1,7 @@
 //! A change of an experiment, or of each experiment of a group: a failure does not stop
-//! the others.
+//! the others, an interrupt does.
+
+use std::{iter, pin::pin};
 
 use swarm_proto::v1::{Experiment, ExperimentState};
 
@@ -7,6 +9,7 @@ use crate::{
     args::Target,
     connection::Connection,
     error::{Code, Error},
+    interrupt,
     progress::Progress,
     subject::Subject,
     text,
@@ -17,7 +20,7 @@ use crate::{
 pub struct Outcome<T> {
     /// The changed experiments.
     pub changed: Vec<T>,
-    /// The reasons of the failures.
+    /// The reasons of the failures, or an interrupt.
     failure: Option<Error>,
 }
 
@@ -25,6 +28,11 @@ impl<T> Outcome<T> {
     /// The error if a change failed. It is printed after the changed experiments.
     pub fn end(self) -> Result<(), Error> {
         self.failure.map_or(Ok(()), Err)
+    }
+
+    /// Whether a signal came before all changes were made.
+    pub fn is_interrupted(&self) -> bool {
+        matches!(self.failure, Some(Error::Interrupted(_)))
     }
 }
 
@@ -51,19 +59,39 @@ pub async fn members(
     }
 }
 
-/// Changes experiments, one after the other. Stops early only for an error that would repeat
-/// for all.
+/// Changes experiments, one after the other. Stops early only for an interrupt, and for an error
+/// that would repeat for all.
 pub async fn change_each<T>(
     members: &[Experiment],
     progress: &mut Progress,
     change: impl AsyncFn(u64) -> Result<T, Error>,
 ) -> Outcome<T> {
+    change_until(interrupt::came(), members, progress, change).await
+}
+
+/// Like [`change_each`], with any future as the interrupt.
+async fn change_until<T>(
+    interrupt: impl Future<Output = ()>,
+    members: &[Experiment],
+    progress: &mut Progress,
+    change: impl AsyncFn(u64) -> Result<T, Error>,
+) -> Outcome<T> {
+    let mut interrupt = pin!(interrupt);
     let (mut changed, mut lines, mut first) = (Vec::new(), Vec::new(), None);
     for (n_done, experiment) in members.iter().enumerate() {
         if members.len() > 1 {
             progress.step(n_done as u64, members.len() as u64, "experiments");
         }
-        match change(experiment.id).await {
+        let result = tokio::select! {
+            biased;
+            () = &mut interrupt => {
+                progress.clear();
+                let failure = Some(interrupted(changed.len(), experiment, members.len(), &lines));
+                return Outcome { changed, failure };
+            }
+            result = change(experiment.id) => result,
+        };
+        match result {
             Ok(result) => changed.push(result),
             // A single error is printed without a list.
             Err(error) if members.len() == 1 => {
@@ -90,8 +118,34 @@ pub async fn change_each<T>(
     Outcome { changed, failure }
 }
 
+/// The error of an interrupt while `experiment` was being changed. `unchanged`: a line about each
+/// experiment whose change failed.
+fn interrupted(
+    n_changed: usize,
+    experiment: &Experiment,
+    n_all: usize,
+    unchanged: &[String],
+) -> Error {
+    let doubtful = text::title(experiment);
+    if n_all == 1 {
+        let what = format!("{doubtful} may be changed; repeat the command to be sure");
+        return Error::Interrupted(what);
+    }
+    let first = format!(
+        "{n_changed} of {n_all} experiments are changed, and {doubtful} may be; repeat the command \
+         to change the others"
+    );
+    let lines: Vec<&str> =
+        iter::once(&*first).chain(unchanged.iter().map(String::as_str)).collect();
+    Error::Interrupted(lines.join("\n"))
+}
+
 #[cfg(test)]
 mod tests {
+    use std::future::pending;
+
+    use tokio_util::sync::CancellationToken;
+
     use super::*;
     use crate::output_format::OutputFormat;
 
@@ -136,5 +190,50 @@ mod tests {
         let change = async |_| Err::<u64, _>(Error::NotFound("it has not ended".into()));
         let error = change_each(&group(1), &mut quiet(), change).await.end().unwrap_err();
         assert_eq!(error.report(), "error: it has not ended");
+    }
+
+    /// The outcome of changes of a group whose last but one hangs until an interrupt comes. Of more
+    /// than three, the first fails.
+    async fn interrupted_at_last_but_one(n: u64) -> Outcome<u64> {
+        let signal = CancellationToken::new();
+        let change = async |id: u64| match id {
+            1 if n > 3 => Err(Error::NotFound("it has not ended".into())),
+            id if id + 1 == n => {
+                signal.cancel();
+                pending().await
+            }
+            id => Ok(id),
+        };
+        change_until(signal.cancelled(), &group(n), &mut quiet(), change).await
+    }
+
+    #[tokio::test]
+    async fn an_interrupt_keeps_the_changes_so_far_and_names_the_doubtful_one() {
+        let outcome = interrupted_at_last_but_one(3).await;
+        assert!(outcome.is_interrupted());
+        assert_eq!(outcome.changed, [1]);
+        let error = outcome.end().unwrap_err();
+        assert_eq!(error.exit_code(), 130);
+        let expected = "interrupted; 1 of 3 experiments are changed, and experiment 2 (a) may be; \
+                        repeat the command to change the others";
+        assert_eq!(error.report(), expected);
+    }
+
+    #[tokio::test]
+    async fn an_interrupt_hides_no_failure_before_it() {
+        let error = interrupted_at_last_but_one(4).await.end().unwrap_err();
+        let report = error.report();
+        for part in ["1 of 4 experiments", "experiment 3 (a) may be", "\nexperiment 1 (a): it"] {
+            assert!(report.contains(part), "{report}");
+        }
+    }
+
+    #[tokio::test]
+    async fn an_interrupted_change_of_one_experiment_may_have_been_made() {
+        let change = async |_| pending::<Result<u64, Error>>().await;
+        let outcome = change_until(async {}, &group(1), &mut quiet(), change).await;
+        let expected =
+            "interrupted; experiment 1 (a) may be changed; repeat the command to be sure";
+        assert_eq!(outcome.end().unwrap_err().report(), expected);
     }
 }

@@ -3,13 +3,12 @@
 //! Neither signal leaves unfinished files.
 
 use std::{
-    fs, io,
+    fs,
+    future::pending,
+    io,
     path::{Path, PathBuf},
     process,
-    sync::{
-        Mutex, MutexGuard, Once, OnceLock, PoisonError,
-        atomic::{AtomicBool, Ordering::Relaxed},
-    },
+    sync::{Mutex, MutexGuard, Once, OnceLock, PoisonError},
 };
 
 use tokio::{
@@ -24,8 +23,8 @@ const EXIT_INTERRUPTED: i32 = 130;
 
 /// The token, once the program listens for signals.
 static TOKEN: OnceLock<CancellationToken> = OnceLock::new();
-/// Whether an experiment may have reached a coordinator.
-static SUBMITTED: AtomicBool = AtomicBool::new(false);
+/// What an interrupt leaves of the requested changes; none: no change was requested.
+static REMAINS: Mutex<Option<String>> = Mutex::new(None);
 
 /// Unfinished files and directories, to be removed.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -120,19 +119,24 @@ pub fn goes_on() -> bool {
     TOKEN.get().is_none_or(|token| !token.is_cancelled())
 }
 
-/// Remembers that an experiment is on its way to a coordinator.
-pub fn submitting() {
-    SUBMITTED.store(true, Relaxed);
+/// Waits for the first signal. Waits for ever if the program does not listen for signals, because
+/// then they end the process.
+pub async fn came() {
+    match TOKEN.get() {
+        Some(token) => token.cancelled().await,
+        None => pending().await,
+    }
+}
+
+/// Remembers that a change is on its way. `remains`: what an interrupt leaves of it.
+pub fn changing(remains: String) {
+    *REMAINS.lock().unwrap_or_else(PoisonError::into_inner) = Some(remains);
 }
 
 /// The error of an interrupted command.
 pub fn error() -> Error {
-    let what = if SUBMITTED.load(Relaxed) {
-        "submitted experiments continue on the coordinator"
-    } else {
-        "nothing was submitted"
-    };
-    Error::Interrupted(what.into())
+    let remains = REMAINS.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    Error::Interrupted(remains.unwrap_or_else(|| "nothing was changed".to_owned()))
 }
 
 /// A token that the first signal cancels; the second ends the process, without a loss of

@@ -10,6 +10,7 @@ use std::{
 };
 
 use bundle::Batch;
+use model::limits::EVALUATION_VALUES_MAX;
 use sim_core::{EvaluateError, Isa, Simulation, TrialSet};
 use swarm_proto::v1::{
     ComparisonTrials, EvaluateFitnessRequest, EvolutionTrials, Genes, evolution_trials::Trials,
@@ -79,15 +80,22 @@ impl Resimulation {
     }
 }
 
+/// Number of genotypes in one request to a coordinator, which bounds the bytes of a request and
+/// the numbers of its answer.
+fn n_per_request(batch: &Batch) -> usize {
+    let genotype_len = batch.genotypes.first().map_or(1, |genes| size_of_val(&**genes).max(1));
+    let n_values = (batch.n_trials() as usize * batch.values_per_trial).max(1);
+    (REQUEST_LEN / genotype_len).min(EVALUATION_VALUES_MAX / n_values).max(1)
+}
+
 /// Simulates on a fleet.
 async fn fleet(
     connection: &Connection,
     config_json: &str,
     batch: &Batch,
 ) -> Result<Vec<Vec<f64>>, Error> {
-    let genotype_len = batch.genotypes.first().map_or(1, |genes| size_of_val(&**genes).max(1));
     let mut fitness = Vec::new();
-    for genotypes in batch.genotypes.chunks((REQUEST_LEN / genotype_len).max(1)) {
+    for genotypes in batch.genotypes.chunks(n_per_request(batch)) {
         let request = EvaluateFitnessRequest {
             config_json: config_json.to_owned(),
             genotypes: genotypes.iter().map(|genes| Genes { values: genes.clone() }).collect(),
@@ -169,4 +177,27 @@ fn items(batch: &Batch) -> Vec<(usize, Range<u32>)> {
         }
     }
     items
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn batch(n_genes: usize, n_trials: usize, values_per_trial: usize) -> Batch {
+        Batch {
+            trial_set: TrialSet::Generation(0),
+            genotypes: vec![vec![0.5; n_genes]].into(),
+            values: vec![vec![0.0; n_trials * values_per_trial]],
+            values_per_trial,
+        }
+    }
+
+    #[test]
+    fn a_request_stays_below_the_bounds_of_the_coordinator() {
+        let n_elites = n_per_request(&batch(10, 200, 3));
+        assert_eq!(n_elites, EVALUATION_VALUES_MAX / 600, "the numbers of the answer bound it");
+        assert_eq!(n_per_request(&batch(1024, 2, 1)), 512, "the bytes of the genes bound it");
+        assert_eq!(n_per_request(&batch(1 << 20, 2, 1)), 1, "a request is never empty");
+        assert_eq!(n_per_request(&batch(0, 0, 1)), EVALUATION_VALUES_MAX);
+    }
 }

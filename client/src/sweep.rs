@@ -1,6 +1,6 @@
 //! Sweeps: the runs of one experiment file with several seeds and values.
 
-use std::{collections::BTreeSet, str::FromStr};
+use std::{collections::BTreeSet, fmt, str::FromStr};
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
@@ -66,6 +66,22 @@ impl FromStr for Seeds {
             seeds.extend(first..=last);
         }
         Ok(Self(seeds.into_iter().collect()))
+    }
+}
+
+impl fmt::Display for Seeds {
+    /// Writes what [`Seeds::from_str`] reads, such as `1,5..9`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // The seeds ascend, so the first of two is below the maximum.
+        let spans = self.0.chunk_by(|seed, next| seed + 1 == *next);
+        for (i, span) in spans.enumerate() {
+            let separator = if i == 0 { "" } else { "," };
+            match span {
+                [first, .., last] => write!(f, "{separator}{first}..{last}")?,
+                rest => rest.iter().try_for_each(|seed| write!(f, "{separator}{seed}"))?,
+            }
+        }
+        Ok(())
     }
 }
 

@@ -338,6 +338,7 @@ pub fn fitting(text: &str, width: Option<usize>) -> String {
 
 /// The message that a data directory has no workers, with the program that uses it.
 pub fn no_fleet(data_dir: &Path, holder: Option<&Holder>) -> String {
+    let start = ["coordinator", "--data-dir", &data_dir.to_string_lossy()].map(str::to_owned);
     let data_dir = data_dir.display();
     match holder {
         Some(Holder { address: Some(address), .. }) => {
@@ -347,8 +348,9 @@ pub fn no_fleet(data_dir: &Path, holder: Option<&Holder>) -> String {
             format!("{data_dir} is a data directory, in which {holder} computes; it has no fleet")
         }
         None => format!(
-            "{data_dir} is a data directory, in which no program computes\n  -> for a fleet, start: \
-             coordinator --data-dir {data_dir}"
+            "{data_dir} is a data directory, in which no program computes\n  -> for a fleet, \
+             start: {}",
+            shell_command(start)
         ),
     }
 }

@@ -1,14 +1,17 @@
-//! Workers as jobs of a real Slurm, with a controller and a node on this machine.
+//! Workers as jobs of a real Slurm, with a controller and a node on this machine; and a Slurm of
+//! scripts that fails on purpose.
 
 use std::{
-    fs,
+    env, fs,
+    io::{BufRead as _, BufReader, Read as _},
     net::TcpListener,
+    os::unix::fs::PermissionsExt as _,
     path::Path,
     process::{Child, Command, Stdio},
 };
 
 use harness::{CoordinatorProcess, Experiment, binary, skipped, undisturbed};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// Processes that end with the test.
 struct Running(Vec<Child>);
@@ -121,4 +124,59 @@ fn workers_are_jobs_of_slurm_as_long_as_there_is_something_to_compute() {
     let (_, second) = coordinator.process.find(n_seen, "the end of the other", left);
     assert_ne!(first["name"], second["name"]);
     assert_eq!(second["workers"], 0);
+}
+
+/// Lists the jobs, except at the second call.
+const SQUEUE: &str = "#!/bin/sh
+cd \"$(dirname \"$0\")\" && echo >> looks
+if [ \"$(wc -l < looks)\" -eq 2 ]; then echo 'Unable to contact slurm controller' >&2; exit 1; fi
+touch jobs && cat jobs
+";
+
+/// Accepts a job that waits, except at the second call.
+const SBATCH: &str = "#!/bin/sh
+cd \"$(dirname \"$0\")\" && echo >> submissions
+n=$(($(wc -l < submissions)))
+if [ $n -eq 2 ]; then echo 'QOSMaxSubmitJobPerUserLimit' >&2; exit 1; fi
+echo \"$n PD\" >> jobs
+echo $n
+";
+
+#[test]
+fn a_slurm_that_fails_for_a_while_is_asked_again_and_no_job_is_forgotten() {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, script) in [("squeue", SQUEUE), ("sbatch", SBATCH)] {
+        let path = directory.path().join(name);
+        fs::write(&path, script).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    let path = env::var_os("PATH").unwrap();
+    let path = [directory.path().to_owned()].into_iter().chain(env::split_paths(&path));
+    let path = env::join_paths(path).unwrap();
+
+    let coordinator = CoordinatorProcess::start();
+    // Enough work for two workers.
+    let population = |file: &mut Value| file["algorithm"]["population_size"] = 24.into();
+    coordinator.submit(&Experiment::tiny(3).edit(population).path());
+    let mut fleet = Command::new(binary("swarmctl"))
+        .args(["--output", "json", "--coordinator", &coordinator.url()])
+        .args(["fleet", "slurm", "--max", "2", "--interval", "1s"])
+        .env("PATH", path)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (looks, mut stderr) = (fleet.stdout.take().unwrap(), fleet.stderr.take().unwrap());
+    let fleet = Running(vec![fleet]);
+    let mut looks = BufReader::new(looks).lines().map(Result::unwrap);
+    for (n_jobs, submitted) in [(0, "1"), (1, "3")] {
+        let look: Value = serde_json::from_str(&looks.next().unwrap()).unwrap();
+        assert_eq!((&look["jobs"], &look["submitted"]), (&json!(n_jobs), &json!([submitted])));
+    }
+    drop(fleet);
+    let mut remarks = String::new();
+    stderr.read_to_string(&mut remarks).unwrap();
+    for program in ["sbatch: QOSMaxSubmitJobPerUserLimit", "squeue: Unable to contact"] {
+        assert!(remarks.contains(program), "{remarks}");
+    }
 }

@@ -8,8 +8,8 @@ use tokio_util::sync::CancellationToken;
 
 use super::{RemoteCommand, run::log};
 use crate::{
-    args::cores, connection::Connection, error::Error, local::fleet::Fleet, progress::Progress,
-    remote::Remote, text,
+    args::cores, connection::Connection, error::Error, interrupt, local::fleet::Fleet,
+    progress::Progress, remote::Remote, text,
 };
 
 /// Executes a command with its own coordinator and workers, and stops them even if the command
@@ -27,8 +27,9 @@ pub async fn compute(
     let connection = fleet.connection();
     let result = tokio::select! {
         biased;
-        () = interrupt.cancelled() => Err(interrupted(&connection, data_dir)),
+        // The command itself sees an interrupt first, to print what it has changed.
         result = command.execute(&connection, progress) => result,
+        () = interrupt.cancelled() => Err(interrupted(&connection, data_dir)),
         error = fleet.failure() => Err(error),
     };
     progress.clear();
@@ -40,10 +41,10 @@ fn interrupted(connection: &Connection, data_dir: &Path) -> Error {
     let directory = data_dir.display().to_string();
     let resume = |id: u64| format!("\n  {}", text::command_in("resume", id, data_dir));
     let commands: String = connection.going().into_iter().map(resume).collect();
-    Error::Interrupted(match &*commands {
-        "" => "no experiment was started".to_owned(),
-        commands => {
-            format!("{directory} stores all complete generations. Continue with:{commands}")
-        }
-    })
+    if commands.is_empty() {
+        return interrupt::error();
+    }
+    Error::Interrupted(format!(
+        "{directory} stores all complete generations. Continue with:{commands}"
+    ))
 }

@@ -62,7 +62,8 @@ impl Remote for PauseArgs {
         let is_any_paused = !outcome.changed.is_empty();
         let printed = print(&self.target, outcome, text::state_line, progress);
         if is_any_paused && !progress.is_json() {
-            progress.print(&format!("continue with: swarmctl resume {}", self.target.subject))?;
+            let resume = connection.command(&["resume", &self.target.subject.to_string()]);
+            progress.print(&format!("continue with: {resume}"))?;
         }
         printed
     }
@@ -205,7 +206,7 @@ async fn each(
 }
 
 /// Prints the continued experiments; follows them to their end if this process computes
-/// them.
+/// them, unless an interrupt came.
 pub async fn follow(
     target: &Target,
     outcome: Outcome<Experiment>,
@@ -213,8 +214,9 @@ pub async fn follow(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let changed = outcome.changed.clone();
-    let is_followed = connection.computes() && !changed.is_empty();
-    let printed = match is_followed && progress.is_json() {
+    let is_computed = connection.computes() && !changed.is_empty();
+    let is_followed = is_computed && !outcome.is_interrupted();
+    let printed = match is_computed && progress.is_json() {
         true => outcome.end(),
         false => print(target, outcome, text::state_line, progress),
     };

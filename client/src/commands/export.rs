@@ -86,7 +86,8 @@ async fn export(
     };
     let (path, bytes, next) = match (&args.to, &args.tensorboard) {
         (Some(path), _) => {
-            let next = format!("check it with: swarmctl verify {}", path.display());
+            let words = ["swarmctl", "verify", &path.to_string_lossy()].map(str::to_owned);
+            let next = format!("check it with: {}", text::shell_command(words));
             (path.clone(), connection.export(id).await?, next)
         }
         (None, Some(directory)) => {

@@ -1,6 +1,7 @@
 //! `swarmctl fleet`: as many workers as the experiments need, as jobs of a batch system.
 
 mod autoscaler;
+mod patience;
 mod slurm;
 
 use std::{
@@ -16,7 +17,8 @@ use swarm_telemetry::parse_positive_duration;
 use tokio::time::{Instant, sleep};
 
 use self::{
-    autoscaler::{Autoscaler, Bounds, ITEMS_PER_WORKER, Job, Plan},
+    autoscaler::{Autoscaler, Bounds, Done, ITEMS_PER_WORKER, Job, Plan},
+    patience::Patience,
     slurm::Slurm,
 };
 use crate::{
@@ -150,8 +152,12 @@ async fn scale(
     interval: Duration,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let mut autoscaler = Autoscaler::new(bounds);
-    let mut lives = Lives::new(slurm.idle_timeout);
+    let mut scaler = Scaler {
+        autoscaler: Autoscaler::new(bounds),
+        lives: Lives::new(slurm.idle_timeout),
+        looking: Patience::default(),
+        acting: Patience::default(),
+    };
     if !progress.is_json() {
         progress.remark(&format!(
             "jobs are named {}; one worker for {ITEMS_PER_WORKER} open items, {} to {} workers",
@@ -160,29 +166,77 @@ async fn scale(
     }
     loop {
         let n_items = open_items(connection).await?;
-        let mut jobs = slurm.jobs().await?;
-        lives.see(Instant::now(), &jobs)?;
-        jobs.retain(|job| !lives.finishing.contains(&job.id));
-        let n_wanted = autoscaler.wanted(Instant::now(), n_items, jobs.len() as u32);
+        scaler.check(n_items, slurm, progress).await?;
+        sleep(interval).await;
+    }
+}
+
+/// What the command remembers from one check of the queues to the next.
+#[derive(Debug)]
+struct Scaler {
+    autoscaler: Autoscaler,
+    lives: Lives,
+    /// The patience with the list of jobs.
+    looking: Patience,
+    /// The patience with the submission and the end of jobs.
+    acting: Patience,
+}
+
+impl Scaler {
+    /// Lists the jobs, and submits and ends as many as the items require.
+    async fn check(
+        &mut self,
+        n_items: u64,
+        slurm: &Slurm,
+        progress: &mut Progress,
+    ) -> Result<(), Error> {
+        let mut jobs = match slurm.jobs().await {
+            Ok(jobs) => jobs,
+            Err(error) => return bear(&mut self.looking, error, progress),
+        };
+        self.looking.succeeded(Instant::now());
+        if !jobs.is_empty() {
+            // Slurm accepts jobs: a refusal is a limit, which passes.
+            self.acting.works(Instant::now());
+        }
+        self.lives.see(Instant::now(), &jobs)?;
+        jobs.retain(|job| !self.lives.finishing.contains(&job.id));
+        let n_wanted = self.autoscaler.wanted(Instant::now(), n_items, jobs.len() as u32);
         let plan = Plan::new(&jobs, n_wanted);
-        if !plan.is_empty() {
-            let submitted = slurm.carry_out(&plan).await?;
-            lives.acted(Instant::now(), &submitted, &plan);
+        if plan.is_empty() {
+            return Ok(());
+        }
+        let mut done = Done::default();
+        let result = slurm.carry_out(plan, &mut done).await;
+        self.lives.acted(Instant::now(), &done);
+        if !done.is_empty() {
+            self.acting.works(Instant::now());
             let look = Look {
                 items: n_items,
                 jobs: jobs.len(),
                 wanted: n_wanted,
-                submitted: &submitted,
-                withdrawn: &plan.withdraw,
-                finishing: &plan.finish,
+                submitted: &done.submitted,
+                withdrawn: &done.withdrawn,
+                finishing: &done.finishing,
             };
             match progress.is_json() {
                 true => progress.print_line(&look)?,
                 false => progress.print(&look.line())?,
             }
         }
-        sleep(interval).await;
+        match result {
+            Ok(()) => self.acting.succeeded(Instant::now()),
+            Err(error) => bear(&mut self.acting, error, progress)?,
+        }
+        Ok(())
     }
+}
+
+/// Reports a failure of Slurm that the next check may find gone, or gives up with it.
+fn bear(patience: &mut Patience, error: Error, progress: &Progress) -> Result<(), Error> {
+    let remark = patience.failed(Instant::now(), error)?;
+    remark.iter().for_each(|remark| progress.remark(remark));
+    Ok(())
 }
 
 impl Look<'_> {
@@ -267,9 +321,9 @@ impl Lives {
         Ok(())
     }
 
-    fn acted(&mut self, now: Instant, submitted: &[String], plan: &Plan) {
-        self.since.extend(submitted.iter().map(|id| (id.clone(), now)));
-        self.finishing.extend(plan.withdraw.iter().chain(&plan.finish).cloned());
+    fn acted(&mut self, now: Instant, done: &Done) {
+        self.since.extend(done.submitted.iter().map(|id| (id.clone(), now)));
+        self.finishing.extend(done.withdrawn.iter().chain(&done.finishing).cloned());
     }
 }
 
@@ -289,12 +343,12 @@ mod tests {
         let mut lives = Lives::new(2 * SHORT_LIFE);
         let mut now = Instant::now();
         let mut run = |id: &str, lasts: Duration, is_told: bool| {
-            let ids = [id.to_owned()];
+            let ids = vec![id.to_owned()];
             let job = Job { id: id.to_owned(), is_running: true };
-            lives.acted(now, &ids, &Plan::default());
+            lives.acted(now, &Done { submitted: ids.clone(), ..Done::default() });
             lives.see(now, std::slice::from_ref(&job)).unwrap();
             if is_told {
-                lives.acted(now, &[], &Plan { finish: ids.into(), ..Plan::default() });
+                lives.acted(now, &Done { finishing: ids, ..Done::default() });
             }
             now += lasts;
             lives.see(now, &[])

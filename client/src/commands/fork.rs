@@ -92,7 +92,8 @@ impl Remote for ForkArgs {
             let mut lines = vec![text::submitted(&experiment)];
             lines.extend(text::origin(&experiment));
             if !is_followed {
-                lines.push(format!("follow it with: swarmctl watch {}", experiment.id));
+                let watch = connection.command(&["watch", &experiment.id.to_string()]);
+                lines.push(format!("follow it with: {watch}"));
             }
             progress.print(&lines.join("\n"))?;
         } else if !is_followed {

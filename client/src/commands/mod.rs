@@ -181,7 +181,8 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
     }
 }
 
-/// Executes a command that an interrupt may end at any time.
+/// Executes a command that an interrupt may end at any time. The command itself sees an interrupt
+/// first: one that changes experiments then prints those that it has changed.
 async fn ask(
     connection: Connection,
     command: RemoteCommand,
@@ -191,14 +192,11 @@ async fn ask(
 ) -> Result<(), Error> {
     let result = tokio::select! {
         biased;
+        result = command.execute(&connection, progress) => result,
         () = interrupt.cancelled() => Err(match intent {
             Intent::Read => Error::Interrupted("this command changes no experiment".into()),
-            Intent::Submit | Intent::Continue if connection.data_dir().is_none() => {
-                interrupt::error()
-            }
-            _ => Error::Interrupted("every change was printed".into()),
+            _ => interrupt::error(),
         }),
-        result = command.execute(&connection, progress) => result,
     };
     progress.clear();
     connection.close().await;

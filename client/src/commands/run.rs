@@ -104,7 +104,7 @@ pub async fn run(
     let result = tokio::select! {
         biased;
         () = interrupt.cancelled() => Err(interrupted(&data_dir)),
-        result = evolve(&connection, &runs, args, &mut progress) => result,
+        result = evolve(&connection, &runs, args, &data_dir, &mut progress) => result,
         error = fleet.failure() => Err(error),
     };
     progress.clear();
@@ -121,6 +121,7 @@ async fn evolve(
     connection: &Connection,
     runs: &[SweepRun],
     args: &RunArgs,
+    data_dir: &Path,
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let unfinished = connection.running().await?;
@@ -131,7 +132,7 @@ async fn evolve(
         }
         None => submit_all(runs, Manner::default(), connection, progress).await?,
     };
-    for remark in remarks(&submitted, &unfinished) {
+    for remark in remarks(&submitted, &unfinished, data_dir) {
         progress.remark(&remark);
     }
     if !progress.is_json() {
@@ -203,17 +204,23 @@ async fn running_coordinator(settings: Settings, experiment: Vec<String>) -> Opt
     let request = ListWorkersRequest {};
     let listing = connection.call_fleet(async |client| client.list_workers(request).await);
     let n_workers = timeout(ANSWER_TIME, listing).await.ok()?.ok()?.workers.len() as u64;
-    let command = ["swarmctl", "submit"].map(str::to_owned).into_iter().chain(experiment);
-    Some(format!(
-        "a coordinator with {} runs at {}: {} evolves there; this command uses this machine only",
+    Some(way_to_coordinator(n_workers, connection.address(), experiment))
+}
+
+/// `experiment`: the words of a command line for the same experiments.
+fn way_to_coordinator(n_workers: u64, address: &str, experiment: Vec<String>) -> String {
+    let submit = ["swarmctl", "submit"].map(str::to_owned).into_iter().chain(experiment);
+    let place = ["--coordinator", address].map(str::to_owned);
+    format!(
+        "a coordinator with {} runs at {address}: {} evolves there; this command uses this machine \
+         only",
         text::counted(n_workers, "worker"),
-        connection.address(),
-        text::shell_command(command)
-    ))
+        text::shell_command(submit.chain(place))
+    )
 }
 
 /// Remarks that experiments are continued, and on other unfinished experiments.
-fn remarks(submitted: &[Experiment], unfinished: &[Experiment]) -> Vec<String> {
+fn remarks(submitted: &[Experiment], unfinished: &[Experiment], data_dir: &Path) -> Vec<String> {
     let is_ours = |other: &&Experiment| submitted.iter().any(|ours| ours.id == other.id);
     let (continued, others): (Vec<_>, Vec<_>) = unfinished.iter().partition(is_ours);
     let continuing = continued.iter().map(|this| {
@@ -226,10 +233,9 @@ fn remarks(submitted: &[Experiment], unfinished: &[Experiment]) -> Vec<String> {
     });
     let company = others.iter().map(|other| {
         format!(
-            "{} in this data directory is also unfinished, and stays so; continue it with: swarmctl \
-             resume {}",
+            "{} in this data directory is also unfinished, and stays so; continue it with: {}",
             text::title(other),
-            other.id
+            text::command_in("resume", other.id, data_dir)
         )
     });
     continuing.chain(company).collect()
@@ -277,15 +283,24 @@ mod tests {
 
     #[test]
     fn a_new_experiment_alone_needs_no_remark() {
-        assert!(remarks(&[experiment(3, "a")], &[]).is_empty());
+        assert!(remarks(&[experiment(3, "a")], &[], Path::new("data")).is_empty());
     }
 
     #[test]
     fn continued_and_other_unfinished_experiments_are_remarked_on() {
         let unfinished = [experiment(2, "b"), experiment(3, "a")];
-        let lines = remarks(&[experiment(3, "a")], &unfinished);
+        let lines = remarks(&[experiment(3, "a")], &unfinished, Path::new("a b"));
         assert_eq!(lines[0], "continuing experiment 3 (a), 12 of 40 generations done");
         assert!(lines[1].contains("experiment 2 (b)"));
+        assert!(lines[1].ends_with(": swarmctl resume 2 --data-dir 'a b'"), "{}", lines[1]);
         assert_eq!(lines.len(), 2);
+    }
+
+    #[test]
+    fn the_way_to_a_coordinator_names_it_and_the_same_experiment() {
+        let words = ["my file.json", "--seed", "7"].map(str::to_owned).into();
+        let remark = way_to_coordinator(2, "http://h:1", words);
+        let submit = "swarmctl submit 'my file.json' --seed 7 --coordinator http://h:1 evolves";
+        assert!(remark.contains(submit), "{remark}");
     }
 }

@@ -98,14 +98,16 @@ async fn submit(
         (false, Some(group)) => {
             progress.print(&text::submitted_group(group, &submitted))?;
             if !is_followed {
-                progress.print(&format!("follow it with: swarmctl watch {group}"))?;
+                let watch = connection.command(&["watch", group]);
+                progress.print(&format!("follow it with: {watch}"))?;
             }
         }
         (false, None) => {
             let experiment = &submitted[0];
             progress.print(&text::submitted(experiment))?;
             if !is_followed {
-                progress.print(&format!("follow it with: swarmctl watch {}", experiment.id))?;
+                let watch = connection.command(&["watch", &experiment.id.to_string()]);
+                progress.print(&format!("follow it with: {watch}"))?;
             }
         }
     }

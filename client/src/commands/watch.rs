@@ -201,14 +201,11 @@ async fn compare_group(
     compare::of_group(connection, group, progress).await?;
     let mut next = String::from("\nnext:");
     for words in [
-        vec!["compare", group, "--to", "comparison.svg"],
-        vec!["plot", group, "--to", "fitness.svg"],
-        vec!["list", group],
+        &["compare", group, "--to", "comparison.svg"][..],
+        &["plot", group, "--to", "fitness.svg"],
+        &["list", group],
     ] {
-        let words = ["swarmctl"].into_iter().chain(words).map(str::to_owned);
-        let place = connection.named_place().map(|dir| vec!["--data-dir".to_owned(), dir]);
-        let words = words.chain(place.unwrap_or_default());
-        next += &format!("\n  {}", text::shell_command(words));
+        next += &format!("\n  {}", connection.command(words));
     }
     progress.print(&next)
 }

@@ -11,6 +11,7 @@ use crate::{
     clock, complete,
     connection::Connection,
     error::Error,
+    interrupt,
     place::Intent,
     progress::Progress,
     remote::Remote,
@@ -113,6 +114,8 @@ impl Remote for WorkersArgs {
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         if let Some(name) = self.readmit {
+            let look = connection.command(&["workers"]);
+            interrupt::changing(format!("the worker may be readmitted; `{look}` shows its state"));
             let request = ReadmitWorkerRequest { name };
             connection
                 .call_fleet(async |client| client.readmit_worker(request.clone()).await)

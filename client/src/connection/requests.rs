@@ -24,7 +24,10 @@ impl Connection {
         &self,
         request: SubmitExperimentRequest,
     ) -> Result<SubmitExperimentResponse, Error> {
-        interrupt::submitting();
+        interrupt::changing(match self.data_dir() {
+            None => "submitted experiments continue on the coordinator".to_owned(),
+            Some(_) => format!("`{}` shows what was submitted", self.command(&["list"])),
+        });
         self.call(async |client| client.submit_experiment(request.clone()).await).await
     }
 
@@ -134,6 +137,8 @@ impl Connection {
     /// Imports a bundle; not repeated. Returns the experiment, and whether the coordinator did
     /// not have it before.
     pub async fn import(&self, bundle: &[u8]) -> Result<(Experiment, bool), Error> {
+        let remains = "the experiment may be imported; a second import changes nothing";
+        interrupt::changing(remains.to_owned());
         let pieces = bundle.chunks(PIECE_LEN).map(<[u8]>::to_vec).collect::<Vec<_>>();
         let requests = pieces.into_iter().map(|piece| ImportExperimentRequest { piece });
         let imported = async {

@@ -45,7 +45,7 @@ fn exit_codes_of_errors_in_this_process() {
     let cancelled = Error::Cancelled { id: 3, reason: String::new() };
     assert_eq!(cancelled.exit_code(), 6);
     assert_eq!(cancelled.report(), "error: experiment 3 was cancelled");
-    assert_eq!(Error::TimedOut { id: 3 }.exit_code(), 10);
+    assert_eq!(Error::TimedOut { id: 3, explain: "x".into() }.exit_code(), 10);
     assert_eq!(Error::Damaged("x".into()).exit_code(), 11);
     assert_eq!(Error::Flawed("x".into()).exit_code(), 12);
     assert_eq!(Error::Interrupted("x".into()).exit_code(), 130);

@@ -35,6 +35,9 @@ fn seeds_are_listed_or_spanned_with_both_ends() {
     assert_eq!(seeds("0..4").unwrap(), [0, 1, 2, 3, 4]);
     assert_eq!(seeds("7,1..2, 1").unwrap(), [1, 2, 7]);
     assert_eq!(seeds("18446744073709551615").unwrap(), [u64::MAX]);
+    for text in ["0..4", "1..2,7", "7", "18446744073709551614..18446744073709551615"] {
+        assert_eq!(Seeds::from_str(text).unwrap().to_string(), text, "they are written alike");
+    }
     for text in ["", "a", "1..", "4..2", "1,,2", "-1", "0..18446744073709551615", "0..1000"] {
         seeds(text).unwrap_err();
     }

@@ -94,6 +94,24 @@ impl Plan {
     }
 }
 
+/// What was done of a plan.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Done {
+    /// Numbers of the submitted jobs.
+    pub submitted: Vec<String>,
+    /// Numbers of the waiting jobs that were withdrawn.
+    pub withdrawn: Vec<String>,
+    /// Numbers of the jobs whose workers were told to finish.
+    pub finishing: Vec<String>,
+}
+
+impl Done {
+    /// Whether nothing was done.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

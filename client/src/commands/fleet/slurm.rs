@@ -4,7 +4,7 @@ use std::{ffi::OsStr, process::Output, time::Duration};
 
 use tokio::process::Command;
 
-use super::autoscaler::{Job, Plan};
+use super::autoscaler::{Done, Job, Plan};
 use crate::{error::Error, text};
 
 /// Worker jobs of one fleet in Slurm.
@@ -28,27 +28,32 @@ impl Slurm {
         Ok(parse_jobs(&call("squeue", arguments).await?))
     }
 
-    /// Submits and ends jobs. Returns the numbers of the submitted jobs.
-    pub async fn carry_out(&self, plan: &Plan) -> Result<Vec<String>, Error> {
-        let mut submitted = Vec::new();
+    /// Submits and ends jobs, up to the first failure. Adds to `done` what was done.
+    pub async fn carry_out(&self, plan: Plan, done: &mut Done) -> Result<(), Error> {
         for _ in 0..plan.n_submit {
-            let own = [
-                "--parsable",
-                "--output=swarm-worker-%j.log",
-                &format!("--job-name={}", self.job_name),
-                &format!("--wrap={}", self.script),
-            ];
-            let given = self.sbatch_args.iter().map(String::as_str);
-            let answer = call("sbatch", own.into_iter().chain(given)).await?;
-            // NUMBER, or NUMBER;CLUSTER.
-            let id = answer.trim().split(';').next().unwrap_or_default();
-            submitted.push(id.to_owned());
+            done.submitted.push(self.submit().await?);
         }
         // A job that begins to run meanwhile stays; the next check handles it.
         cancel(&["--state=PENDING"], &plan.withdraw).await?;
+        done.withdrawn = plan.withdraw;
         // The script has replaced itself by the worker, which finishes its items.
         cancel(&["--batch", "--signal=TERM"], &plan.finish).await?;
-        Ok(submitted)
+        done.finishing = plan.finish;
+        Ok(())
+    }
+
+    /// Submits a job, and returns its number.
+    async fn submit(&self) -> Result<String, Error> {
+        let own = [
+            "--parsable",
+            "--output=swarm-worker-%j.log",
+            &format!("--job-name={}", self.job_name),
+            &format!("--wrap={}", self.script),
+        ];
+        let given = self.sbatch_args.iter().map(String::as_str);
+        let answer = call("sbatch", own.into_iter().chain(given)).await?;
+        // NUMBER, or NUMBER;CLUSTER.
+        Ok(answer.trim().split(';').next().unwrap_or_default().to_owned())
     }
 }
 

@@ -415,6 +415,16 @@ async fn an_experiment_that_no_program_computes_is_not_waited_for() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_next_step_after_a_pause_names_the_directory() {
+    let temporary = tempfile::tempdir().unwrap();
+    let path = temporary.path().join("a b");
+    copy(&data_dir(temporary.path()).await, &path);
+    let text = output("pause 3", &["--data-dir", path.to_str().unwrap()]).await;
+    let next = format!("continue with: swarmctl resume 3 --data-dir '{}'", path.display());
+    assert!(text.contains(&next), "{text}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_directory_in_use_is_read_and_not_changed() {
     let temporary = tempfile::tempdir().unwrap();
     let path = data_dir(temporary.path()).await;

@@ -40,7 +40,10 @@ pub async fn wait(
             }
         };
         let experiment = match deadline {
-            Some(at) => timeout_at(at, ended).await.map_err(|_| Error::TimedOut { id })?,
+            Some(at) => timeout_at(at, ended).await.map_err(|_| {
+                let explain = connection.command(&["explain", &id.to_string()]);
+                Error::TimedOut { id, explain }
+            })?,
             None => ended.await,
         }?;
         if progress.is_json() {

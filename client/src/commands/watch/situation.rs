@@ -70,6 +70,11 @@ impl Reader<'_> {
                         return true;
                     }
                     found = stall(&explanation, self.connection.address());
+                    if let (Some(finding), Some(data_dir)) =
+                        (&mut found, self.connection.named_place())
+                    {
+                        finding.name_place(&data_dir);
+                    }
                 }
                 Ok(_) => return false,
                 // The obstacle has lasted.
