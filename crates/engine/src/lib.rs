@@ -381,9 +381,8 @@ impl Engine {
         let process = worker.introduction.process;
         let is_alone = n_computing + worker.written_off.len() == 1;
         let loss = WorkerLoss { process, is_alone };
-        for assignment in worker.written_off.into_values() {
-            self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
-            if is_evidence {
+        if is_evidence {
+            for assignment in worker.written_off.into_values() {
                 self.on_written_off_lost(now, &assignment, loss);
             }
         }
@@ -420,7 +419,6 @@ impl Engine {
     /// Takes a job's items back from all workers, and queues them.
     fn withdraw(&mut self, now: Instant, id: JobId) {
         let mut audits = Vec::new();
-        let mut charged = Duration::ZERO;
         for (&worker_id, worker) in &mut self.workers {
             worker.recalled.retain(|(_, assignment)| assignment.job != id);
             if worker.known_jobs.remove(&id).is_some() {
@@ -430,7 +428,6 @@ impl Engine {
                 let written_off = worker.written_off.extract_if(.., is_ours).collect::<Vec<_>>();
                 for (_, item) in ours.iter().chain(&written_off).cloned() {
                     let who = (worker_id, &*worker);
-                    charged += item.charge;
                     self.timeline.add(now, who, item, Fate::TakenBack, Duration::ZERO);
                 }
                 audits.extend(ours.into_iter().filter(|(_, a)| a.is_audit()).map(|(_, a)| a.item));
@@ -440,7 +437,6 @@ impl Engine {
                 self.commands.push_back(Command::Send(worker_id, ToWorker::End(id)));
             }
         }
-        self.correct_charge(id, charged, Duration::ZERO);
         if let Some(batch) = self.batch_mut(id) {
             batch.requeue_all();
             audits.iter().for_each(|item| batch.push_audit(item));

@@ -226,7 +226,6 @@ impl Engine {
             mem::take(&mut worker.written_off)
         });
         for item in written_off.into_iter().flatten().map(|(_, item)| item) {
-            self.correct_charge(item.job, item.charge, Duration::ZERO);
             let who = (id, &self.workers[&id]);
             self.timeline.add(now, who, item, Fate::TakenBack, Duration::ZERO);
         }

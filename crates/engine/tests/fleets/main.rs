@@ -252,31 +252,6 @@ fn a_paused_experiment_gives_its_workers_up_and_goes_on_where_it_was() {
 }
 
 #[test]
-fn a_pause_costs_an_experiment_no_share_of_the_fleet() {
-    let mut fleet = fleet();
-    let worker = fleet.join_by_hand(10);
-    let other = JobId::Experiment(ExperimentId(2));
-    for job in [EXPERIMENT, other] {
-        fleet.submit(job, 100);
-        fleet.ask(job, 0, 1000, 1);
-    }
-    let step = |fleet: &mut SimulatedFleet| {
-        fleet.run_for(SECOND);
-        fleet.step(worker);
-    };
-    for _ in 0..20 {
-        (0..10).for_each(|_| step(&mut fleet));
-        fleet.tell(|engine, now| engine.on_job_paused(now, EXPERIMENT));
-        fleet.tell(|engine, now| engine.on_job_resumed(now, EXPERIMENT));
-    }
-    let before = fleet.timeline().len();
-    (0..100).for_each(|_| step(&mut fleet));
-    let jobs = fleet.timeline().into_iter().skip(before).map(|entry| entry.job);
-    let n_ours = jobs.filter(|&job| job == EXPERIMENT).count();
-    assert!((40..=60).contains(&n_ours), "{n_ours} of 100 items");
-}
-
-#[test]
 fn audits_find_a_faulty_worker_and_the_generation_goes_on_without_it() {
     let mut fleet = auditing_fleet(0.2);
     let ids: Vec<_> = (0..5).map(|_| fleet.join(1, 1.0)).collect();
