@@ -84,6 +84,8 @@ VARIANTS = {
     },
 }
 AS_IT_IS = "as it is"
+# Other files of configs/original to compare with an experiment; `results/add-run` runs them.
+FILES = {"light_follower_snes_program": {"the file for the GA": "light_follower_ga_program"}}
 IN_FILE_NAMES = str.maketrans(" ", "-", ",'")
 
 
@@ -144,7 +146,7 @@ def report(name):
     """The table of an experiment. Longer runs also have a column of the shorter ones' last generations."""
     variants = {
         variant: [run for seed in SEEDS if (run := read(name, variant, seed))]
-        for variant in [AS_IT_IS, *VARIANTS[name]]
+        for variant in [AS_IT_IS, *VARIANTS[name], *FILES.get(name, {})]
     }
     ends = sorted({len(means) for runs in variants.values() for means, _ in runs})
     heads = [*(f"mean, generations {end - LAST} to {end - 1}" for end in ends), "champion"]
@@ -167,9 +169,10 @@ def columns(runs, ends):
 
 def read(name, variant, seed):
     """The mean fitness of each generation and the champion's worth; None if it has not run."""
-    if variant == AS_IT_IS:
-        history = RESULTS / "histories" / f"{name}-{seed}.csv"
-        champion = RESULTS / "champions" / f"{name}-{seed}.json"
+    file = name if variant == AS_IT_IS else FILES.get(name, {}).get(variant)
+    if file:
+        history = RESULTS / "histories" / f"{file}-{seed}.csv"
+        champion = RESULTS / "champions" / f"{file}-{seed}.json"
     else:
         stem = stem_of(name, variant, seed)
         history, champion = Path(f"{stem}.csv"), Path(f"{stem}.json")
