@@ -215,16 +215,7 @@ class Live(BrowserTest):
         self.wait_for_text(".state", "completed")
 
     def test_generations_that_are_complete_before_an_answer_are_shown_after_it(self):
-        fleet = Fleet()
-        self.addCleanup(fleet.stop)
-        fleet.swarmctl("submit", str(CONFIG), "--generations", "40")
-        self.browser.get(fleet.pages + "/experiment/1")
-        self.wait_for_text(".standing", "Before the first generation")
-        self.hold("/dynamics")
-        self.script("document.querySelector('.dynamics').open = true")
-        fleet.start_worker()
-        self.wait_for_text(".state", "completed")
-        self.release()
+        self.complete_before_an_answer("/dynamics", prepare=lambda: self.script("document.querySelector('.dynamics').open = true"))
         self.find(".dynamics[data-generations='40']")
 
     def test_the_timeline_shows_computed_and_lost_assignments(self):

@@ -203,15 +203,7 @@ class Figures(BrowserTest):
         return str(file)
 
     def test_a_late_answer_about_a_front_is_followed_by_that_of_the_end(self):
-        fleet = Fleet()
-        self.addCleanup(fleet.stop)
-        fleet.swarmctl("submit", self.front_file(), "--generations", "40")
-        self.browser.get(fleet.pages + "/experiment/1")
-        self.wait_for_text(".standing", "Before the first generation")
-        self.hold("/front")
-        fleet.start_worker()
-        self.wait_for_text(".state", "completed")
-        self.release()
+        self.complete_before_an_answer("/front", self.front_file())
         self.wait_for_text(".front", "judged on new trials")
 
     def test_points_of_a_front_are_judged_and_play(self):

@@ -203,20 +203,40 @@ class BrowserTest(unittest.TestCase):
             const [part] = arguments;
             const held = new Promise((go) => (window.goOn = go));
             const ask = window.fetch;
+            window.nHeld = window.nTaken = 0;
             window.fetch = async (address, ...more) => {
                 const answer = await ask(address, ...more);
                 if (String(address).includes(part)) {
-                    window.isHeld = true;
+                    window.nHeld += 1;
                     await held;
+                    for (const read of ["json", "arrayBuffer"]) {
+                        // After a task of its own, the page has done what follows the reading.
+                        answer[read] = () => Response.prototype[read].call(answer)
+                            .finally(() => setTimeout(() => (window.nTaken += 1)));
+                    }
                 }
                 return answer;
             };
         """, part)
 
     def release(self):
-        """Lets the held answers go, and waits until the page must have taken them."""
-        self.wait(lambda: self.script("return window.isHeld"), "no answer is held back")
-        self.browser.execute_async_script("window.goOn(); setTimeout(arguments[0], 500);")
+        """Lets the held answers go, and waits until the page has taken them."""
+        self.wait(lambda: self.script("return window.nHeld > 0"), "no answer is held back")
+        self.script("window.goOn()")
+        self.wait(lambda: self.script("return window.nTaken === window.nHeld"), "an answer is not read")
+
+    def complete_before_an_answer(self, part, file=CONFIG, prepare=lambda: None):
+        """A run that completes while the answers to requests whose address has this part are held back."""
+        fleet = Fleet()
+        self.addCleanup(fleet.stop)
+        fleet.swarmctl("submit", str(file), "--generations", "40")
+        self.browser.get(fleet.pages + "/experiment/1")
+        self.wait_for_text(".standing", "Before the first generation")
+        self.hold(part)
+        prepare()
+        fleet.start_worker()
+        self.wait_for_text(".state", "completed")
+        self.release()
 
     def refuse(self, part, error):
         """Refuses all requests whose address has this part with an error."""

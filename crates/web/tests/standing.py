@@ -85,15 +85,7 @@ class Standing(BrowserTest):
         self.assertEqual(headings, ["Failed", "Events"])
 
     def test_an_event_that_happens_before_an_answer_is_shown_after_it(self):
-        fleet = Fleet()
-        self.addCleanup(fleet.stop)
-        fleet.swarmctl("submit", str(CONFIG), "--generations", "40")
-        self.browser.get(fleet.pages + "/experiment/1")
-        self.wait_for_text(".standing", "Before the first generation")
-        self.hold("/api/experiments/1/events")
-        fleet.start_worker()
-        self.wait_for_text(".state", "completed")
-        self.release()
+        self.complete_before_an_answer("/api/experiments/1/events")
         self.wait_for_text(".events", "completed")
 
     def test_a_refusal_stays_until_somebody_has_read_it(self):
