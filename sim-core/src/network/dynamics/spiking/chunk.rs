@@ -14,8 +14,9 @@ use super::row::Row;
 use crate::lanes::Lanes;
 use determinism::Isa;
 
-/// Vectors in step, at most: enough to hide the latency of a model's equations.
-const MAX_WIDTH: usize = 4;
+/// Vectors in step, at most: enough to hide the latency of a model's equations. Browsers load the
+/// code of every width, and would load a tenth more for wider rows, so they have one.
+const MAX_WIDTH: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
 /// Lanes of a chunk, at most: a neuron that spikes in one of them costs time in all of them.
 const MAX_LANES: usize = 32;
 
@@ -131,9 +132,9 @@ impl Chunk {
                 self.step::<M, C, Z, 1, true>(circuit, neurons, inputs, isa);
             }
             1 => self.step::<M, C, Z, 1, false>(circuit, neurons, inputs, isa),
-            2 => self.step::<M, C, Z, 2, false>(circuit, neurons, inputs, isa),
-            3 => self.step::<M, C, Z, 3, false>(circuit, neurons, inputs, isa),
-            4 => self.step::<M, C, Z, 4, false>(circuit, neurons, inputs, isa),
+            2 if MAX_WIDTH >= 2 => self.step::<M, C, Z, 2, false>(circuit, neurons, inputs, isa),
+            3 if MAX_WIDTH >= 3 => self.step::<M, C, Z, 3, false>(circuit, neurons, inputs, isa),
+            4 if MAX_WIDTH >= 4 => self.step::<M, C, Z, 4, false>(circuit, neurons, inputs, isa),
             width => unreachable!("{width} vectors are more than MAX_WIDTH"),
         }
     }
