@@ -63,6 +63,11 @@ impl Isa {
         }
     }
 
+    /// Whether one instruction multiplies and adds.
+    pub fn is_fused(self) -> bool {
+        matches!(self.0, Level::Fused(_))
+    }
+
     /// Number of f32 lanes per vector.
     pub fn vector_len(self) -> usize {
         struct VectorLen;

@@ -37,6 +37,9 @@ macro_rules! operations {
             type m32s: Copy;
             /// Number of lanes.
             const F32_LANES: usize = size_of::<Self::f32s>() / size_of::<f32>();
+            /// Whether one instruction multiplies and adds. Otherwise, twenty do, which take their
+            /// share of a program and of the time to compile it wherever `mul_add_f32s` is called.
+            const IS_FUSED: bool = true;
 
             /// Values as vectors, and the values that do not fill one.
             fn as_simd_f32s(values: &[f32]) -> (&[Self::f32s], &[f32]) {

@@ -22,6 +22,7 @@ impl Simd for Portable {
     type f32s = pulp::f32x4;
     type u32s = vector::U32x4;
     type m32s = vector::Mask;
+    const IS_FUSED: bool = false;
 
     #[inline(always)]
     fn splat_f32s(self, value: f32) -> Self::f32s {

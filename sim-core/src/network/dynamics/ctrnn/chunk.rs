@@ -12,12 +12,19 @@ use crate::lanes::Lanes;
 use determinism::Isa;
 use experiment_file::InitialRates;
 
-/// Vectors per row of a chunk, at most.
-pub(super) const MAX_WIDTH: usize = 6;
+/// Vectors per row of a chunk, at most. Without fused multiply-adds, more are no faster, and their
+/// code is large.
+pub(super) const fn max_width(is_fused: bool) -> usize {
+    if is_fused { 6 } else { 4 }
+}
+
 /// Vectors per row, at most, for which four neurons at a time are faster than one: one neuron has
 /// too few sums to keep the processor busy. Sixteen registers hold four sums of two vectors; with
-/// more, a sum lives in memory, and every synapse waits for it.
-const MAX_NARROW: usize = 3;
+/// more, a sum lives in memory, and every synapse waits for it. Without fused multiply-adds, a sum
+/// alone keeps many instructions busy.
+const fn max_narrow(is_fused: bool) -> usize {
+    if is_fused { 3 } else { 1 }
+}
 
 /// The state of a network in some neighbouring vectors of lanes.
 #[derive(Debug)]
@@ -73,7 +80,7 @@ impl Chunk {
             4 => isa.run(Work::<4> { kernel, chunk: self, task }),
             5 => isa.run(Work::<5> { kernel, chunk: self, task }),
             6 => isa.run(Work::<6> { kernel, chunk: self, task }),
-            width => unreachable!("{width} vectors are more than MAX_WIDTH"),
+            width => unreachable!("{width} vectors are more than max_width"),
         }
     }
 }
@@ -98,13 +105,16 @@ impl<const W: usize> WithSimd for Work<'_, W> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        if const { W > max_width(S::IS_FUSED) } {
+            unreachable!("a chunk has at most max_width vectors per row");
+        }
         let Self { kernel, chunk, task } = self;
         match task {
             Task::Activate => activate::<S, W>(simd, kernel, chunk),
             Task::Advance(stimuli) => {
                 perceive::<S, W>(simd, kernel, chunk, stimuli);
                 for _ in 0..kernel.n_substeps {
-                    if W > MAX_NARROW {
+                    if W > max_narrow(S::IS_FUSED) {
                         integrate_wide::<S, W>(simd, kernel, chunk);
                     } else {
                         integrate::<S, W>(simd, kernel, chunk);

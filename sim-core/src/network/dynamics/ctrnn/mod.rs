@@ -76,7 +76,7 @@ impl Ctrnn {
         if 3 * n_left * n_vectors_per_lane > 2 * kernel.n_rows() {
             (n_vectors, n_left) = (n_vectors + 1, 0);
         }
-        let n_chunks = n_vectors.div_ceil(chunk::MAX_WIDTH);
+        let n_chunks = n_vectors.div_ceil(chunk::max_width(isa.is_fused()));
         let width = n_vectors.div_ceil(n_chunks.max(1)).max(1);
         let chunks = (0..n_vectors).step_by(width).map(|first| {
             let width = width.min(n_vectors - first);

@@ -185,6 +185,9 @@ impl<const L: usize> WithSimd for Work<'_, L> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        if const { L >= S::F32_LANES } {
+            unreachable!("lanes of a remainder do not fill a vector");
+        }
         let Self { bundles, remainder, task } = self;
         match task {
             Task::Activate => activate::<S, L>(simd, bundles, remainder),

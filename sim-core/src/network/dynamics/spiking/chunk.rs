@@ -14,16 +14,40 @@ use super::row::Row;
 use crate::lanes::Lanes;
 use determinism::Isa;
 
-/// Vectors in step, at most: enough to hide the latency of a model's equations. Browsers load the
-/// code of every width, and would load a tenth more for wider rows, so they have one.
-const MAX_WIDTH: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
+/// Vectors in step, at most: enough to hide the latency of a model's equations.
+const MAX_WIDTH: usize = 4;
 /// Lanes of a chunk, at most: a neuron that spikes in one of them costs time in all of them.
 const MAX_LANES: usize = 32;
 
 /// Vectors per row of a chunk, at most. With plasticity, the weights of each lane take most of its
 /// memory, so it has one.
 pub(super) fn max_width(isa: Isa, is_plastic: bool) -> usize {
-    if is_plastic { 1 } else { MAX_WIDTH.min(MAX_LANES / isa.vector_len()) }
+    if is_plastic { 1 } else { max_width_of(isa.vector_len(), isa.is_fused()) }
+}
+
+/// The same for an instruction set. Without fused multiply-adds, it is one: the code of wider rows
+/// would be a tenth of a program for browsers.
+const fn max_width_of(vector_len: usize, is_fused: bool) -> usize {
+    match MAX_LANES / vector_len {
+        _ if !is_fused => 1,
+        width if width < MAX_WIDTH => width,
+        _ => MAX_WIDTH,
+    }
+}
+
+/// A stage of a step in W vectors per row. Instruction sets with narrower rows have no code of it.
+struct InRows<Stage, const W: usize>(Stage);
+
+impl<Stage: WithSimd, const W: usize> WithSimd for InRows<Stage, W> {
+    type Output = Stage::Output;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        if const { W > max_width_of(S::F32_LANES, S::IS_FUSED) } {
+            unreachable!("a chunk has at most max_width vectors per row");
+        }
+        self.0.with_simd(simd)
+    }
 }
 
 /// The state of a network in some neighbouring vectors of lanes.
@@ -132,9 +156,9 @@ impl Chunk {
                 self.step::<M, C, Z, 1, true>(circuit, neurons, inputs, isa);
             }
             1 => self.step::<M, C, Z, 1, false>(circuit, neurons, inputs, isa),
-            2 if MAX_WIDTH >= 2 => self.step::<M, C, Z, 2, false>(circuit, neurons, inputs, isa),
-            3 if MAX_WIDTH >= 3 => self.step::<M, C, Z, 3, false>(circuit, neurons, inputs, isa),
-            4 if MAX_WIDTH >= 4 => self.step::<M, C, Z, 4, false>(circuit, neurons, inputs, isa),
+            2 => self.step::<M, C, Z, 2, false>(circuit, neurons, inputs, isa),
+            3 => self.step::<M, C, Z, 3, false>(circuit, neurons, inputs, isa),
+            4 => self.step::<M, C, Z, 4, false>(circuit, neurons, inputs, isa),
             width => unreachable!("{width} vectors are more than MAX_WIDTH"),
         }
     }
@@ -147,12 +171,13 @@ impl Chunk {
         inputs: Inputs<'_>,
         isa: Isa,
     ) {
-        isa.run(Perceive::<W, PLASTIC> { circuit, chunk: self, inputs });
+        isa.run(InRows::<_, W>(Perceive::<W, PLASTIC> { circuit, chunk: self, inputs }));
         for substep in 0..circuit.n_substeps {
             let draws = inputs.draws;
-            isa.run(Propagate::<W, PLASTIC> { circuit, chunk: self, draws, substep });
-            isa.run(Integrate::<M, C, Z, W> { neurons, chunk: self });
-            isa.run(Listen::<W> { circuit, chunk: self, substep });
+            let spikes = Propagate::<W, PLASTIC> { circuit, chunk: self, draws, substep };
+            isa.run(InRows::<_, W>(spikes));
+            isa.run(InRows::<_, W>(Integrate::<M, C, Z, W> { neurons, chunk: self }));
+            isa.run(InRows::<_, W>(Listen::<W> { circuit, chunk: self, substep }));
         }
         if PLASTIC && let (Some(rule), Some(memory)) = (&circuit.rule, &mut self.memory) {
             let share = 1.0 / circuit.n_substeps as f32;
