@@ -94,7 +94,7 @@ impl Place {
                 _ => Ok(directory),
             };
         }
-        let is_named = settings.coordinator.as_ref().is_some_and(|address| !address.is_empty());
+        let is_named = settings.has_coordinator();
         match env::var_os(DATA_DIR_VARIABLE).filter(|path| !path.is_empty() && !is_named) {
             Some(path) => Ok(Self::Directory { path: path.into(), is_found: false }),
             None => Ok(Self::Coordinator(settings.or_file()?)),

@@ -52,7 +52,7 @@ impl Resimulation {
         n_threads: Option<u16>,
         isa: IsaArgs,
     ) -> Result<Self, Error> {
-        if settings.data_dir.is_none() && settings.coordinator.is_some() {
+        if settings.data_dir.is_none() && settings.has_coordinator() {
             let settings = settings.or_file()?;
             let connection =
                 Box::new(Connection::new(settings.address(), &settings.credentials()?)?);
@@ -190,6 +190,13 @@ mod tests {
             values: vec![vec![0.0; n_trials * values_per_trial]],
             values_per_trial,
         }
+    }
+
+    #[test]
+    fn an_empty_variable_names_no_fleet() {
+        let settings = Settings { coordinator: Some(String::new()), ..Settings::default() };
+        let place = Resimulation::open(settings, "{}", None, IsaArgs::default());
+        assert!(matches!(place, Ok(Resimulation::Here { .. })));
     }
 
     #[test]

@@ -104,6 +104,11 @@ impl Settings {
         Ok(this.or(others))
     }
 
+    /// Whether the command line or the environment names a coordinator.
+    pub fn has_coordinator(&self) -> bool {
+        self.coordinator.as_ref().is_some_and(|url| !url.is_empty())
+    }
+
     /// An empty variable counts as unset.
     fn without_empty(self) -> Self {
         Self { coordinator: self.coordinator.filter(|url| !url.is_empty()), ..self }
@@ -204,6 +209,7 @@ mod tests {
     fn an_empty_variable_counts_as_unset() {
         let file = settings(Some("http://file:1"));
         assert_eq!(settings(Some("")).without_empty().or(file.clone()), file);
+        assert!(!settings(Some("")).has_coordinator() && file.has_coordinator());
     }
 
     #[test]

@@ -145,7 +145,9 @@ async fn a_list_has_the_wanted_experiments_page_by_page() {
         let named = named.to_owned();
         assert_eq!(list(ListExperimentsRequest { named, ..all() }).await.unwrap(), expected);
     }
-    let states = vec![ExperimentState::Unspecified.into()];
-    let error = list(ListExperimentsRequest { states, ..all() }).await.unwrap_err();
-    assert_eq!(error.code(), Code::InvalidArgument);
+    for unknown in [ExperimentState::Unspecified.into(), 99] {
+        let states = vec![ExperimentState::Running.into(), unknown];
+        let error = list(ListExperimentsRequest { states, ..all() }).await.unwrap_err();
+        assert_eq!(error.code(), Code::InvalidArgument, "{unknown}");
+    }
 }

@@ -2,7 +2,7 @@
 //! events, page by page.
 
 use swarm_proto::v1::{
-    CompletedGeneration, GetExperimentRequest, GetExperimentResponse, ListEventsRequest,
+    self, CompletedGeneration, GetExperimentRequest, GetExperimentResponse, ListEventsRequest,
     ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse, ListGenerationsRequest,
     ListGenerationsResponse,
 };
@@ -104,7 +104,9 @@ impl Reader {
 /// experiment has. Each state and each label takes time and a variable of SQL.
 fn filter(request: ListExperimentsRequest) -> Result<Filter, Status> {
     let mut states: Vec<ExperimentState> = Vec::new();
-    for state in request.states() {
+    for &number in &request.states {
+        let state = v1::ExperimentState::try_from(number)
+            .map_err(|_| Status::invalid_argument(format!("no experiment is in state {number}")))?;
         let state: ExperimentState = state.try_into()?;
         if !states.contains(&state) {
             states.push(state);
