@@ -28,10 +28,13 @@ pub(super) fn max_width(isa: Isa, is_plastic: bool) -> usize {
 /// The same for an instruction set. Without fused multiply-adds, it is one: the code of wider rows
 /// would be a tenth of a program for browsers.
 const fn max_width_of(vector_len: usize, is_fused: bool) -> usize {
-    match MAX_LANES / vector_len {
-        _ if !is_fused => 1,
-        width if width < MAX_WIDTH => width,
-        _ => MAX_WIDTH,
+    let fitting = MAX_LANES / vector_len;
+    if !is_fused {
+        1
+    } else if fitting < MAX_WIDTH {
+        fitting
+    } else {
+        MAX_WIDTH
     }
 }
 
@@ -174,8 +177,8 @@ impl Chunk {
         isa.run(InRows::<_, W>(Perceive::<W, PLASTIC> { circuit, chunk: self, inputs }));
         for substep in 0..circuit.n_substeps {
             let draws = inputs.draws;
-            let spikes = Propagate::<W, PLASTIC> { circuit, chunk: self, draws, substep };
-            isa.run(InRows::<_, W>(spikes));
+            let propagate = Propagate::<W, PLASTIC> { circuit, chunk: self, draws, substep };
+            isa.run(InRows::<_, W>(propagate));
             isa.run(InRows::<_, W>(Integrate::<M, C, Z, W> { neurons, chunk: self }));
             isa.run(InRows::<_, W>(Listen::<W> { circuit, chunk: self, substep }));
         }
