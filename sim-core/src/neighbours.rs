@@ -11,7 +11,7 @@ use crate::torus::{Torus, Vec2, wrap_angle};
 use determinism::Isa;
 
 /// Largest swarm that is searched without a grid.
-const MAX_WITHOUT_GRID: usize = 64;
+const MAX_WITHOUT_GRID: usize = 32;
 /// Number of robots to process together, few enough for their scratch data to stay in the cache.
 const N_ROBOTS_AT_ONCE: usize = 128;
 /// Most cells per robot. The number is limited because every step visits all cells, occupied or
@@ -266,16 +266,11 @@ impl Near<'_> {
                 squares[i] = away.x * away.x + away.y * away.y;
             }
             let robots = &others.robots[start..range.end.min(places.end)];
-            let (mut near, mut n_near) = ([0; N_AT_ONCE], 0);
-            for (i, (&other, square)) in robots.iter().zip(squares).enumerate() {
-                near[n_near % N_AT_ONCE] = i;
-                n_near += usize::from((square <= reach_squared) & (other != robot));
-            }
-            for &i in &near[..n_near] {
-                found.robots[first + n_found] = robots[i];
-                found.away_x[n_found] = away_x[i % N_AT_ONCE];
-                found.away_y[n_found] = away_y[i % N_AT_ONCE];
-                n_found += 1;
+            for (i, &other) in robots.iter().enumerate() {
+                found.robots[first + n_found] = other;
+                found.away_x[n_found] = away_x[i];
+                found.away_y[n_found] = away_y[i];
+                n_found += usize::from((squares[i] <= reach_squared) & (other != robot));
             }
         }
         n_found
