@@ -10,7 +10,8 @@ use crate::polar;
 use crate::torus::{Torus, Vec2, wrap_angle};
 use determinism::Isa;
 
-/// Largest swarm that is searched without a grid.
+/// Largest swarm that is searched without a grid. In a larger one, most robots are far apart, and to
+/// compare all of them takes longer than to sort them.
 const MAX_WITHOUT_GRID: usize = 32;
 /// Number of robots to process together, few enough for their scratch data to stay in the cache.
 const N_ROBOTS_AT_ONCE: usize = 128;
