@@ -4,9 +4,12 @@
 use std::fmt;
 use std::str::FromStr;
 
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 use pulp::Arch;
 
-use crate::simd::{ByPulp, Portable, Simd, WithSimd};
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+use crate::simd::ByPulp;
+use crate::simd::{Portable, Simd, WithSimd};
 
 /// A level of vector instructions that this processor has.
 #[derive(Clone, Copy)]
@@ -16,7 +19,8 @@ pub struct Isa(Level);
 enum Level {
     /// Without a fused multiply-add.
     Portable,
-    /// With one.
+    /// With one. Other processors have no such level, so their programs have no code of it.
+    #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
     Fused(Arch),
 }
 
@@ -28,16 +32,20 @@ impl Isa {
 
     /// All levels of this processor, the slowest first.
     pub fn available() -> Vec<Self> {
+        let portable = [Level::Portable].into_iter();
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-        let fused = None;
+        let levels = portable;
         #[cfg(target_arch = "x86_64")]
-        let fused = {
+        let levels = {
             let avx2 = pulp::x86::V3::try_new().map(Arch::V3);
-            avx2.into_iter().chain(pulp::x86::V4::try_new().map(Arch::V4))
+            let avx512 = pulp::x86::V4::try_new().map(Arch::V4);
+            portable.chain(avx2.into_iter().chain(avx512).map(Level::Fused))
         };
         #[cfg(target_arch = "aarch64")]
-        let fused = pulp::aarch64::Neon::try_new().map(Arch::Neon);
-        let levels = [Level::Portable].into_iter().chain(fused.into_iter().map(Level::Fused));
+        let levels = {
+            let neon = pulp::aarch64::Neon::try_new().map(Arch::Neon);
+            portable.chain(neon.into_iter().map(Level::Fused))
+        };
         levels.map(Self).collect()
     }
 
@@ -51,6 +59,7 @@ impl Isa {
             Level::Fused(Arch::V4(_)) => "avx512",
             #[cfg(target_arch = "aarch64")]
             Level::Fused(Arch::Neon(_)) => "neon",
+            #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
             Level::Fused(_) => "other",
         }
     }
@@ -59,13 +68,14 @@ impl Isa {
     pub fn run<Op: WithSimd>(self, operation: Op) -> Op::Output {
         match self.0 {
             Level::Portable => operation.with_simd(Portable),
+            #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
             Level::Fused(arch) => arch.dispatch(ByPulp(operation)),
         }
     }
 
     /// Whether one instruction multiplies and adds.
     pub fn is_fused(self) -> bool {
-        matches!(self.0, Level::Fused(_))
+        !matches!(self.0, Level::Portable)
     }
 
     /// Number of f32 lanes per vector.

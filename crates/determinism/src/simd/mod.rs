@@ -124,8 +124,10 @@ operations! {
 }
 
 /// An operation as `pulp` runs it.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 pub(crate) struct ByPulp<Op>(pub Op);
 
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 impl<Op: WithSimd> pulp::WithSimd for ByPulp<Op> {
     type Output = Op::Output;
 
