@@ -3,6 +3,8 @@
 
 use std::fmt;
 use std::str::FromStr;
+#[cfg(target_arch = "x86_64")]
+use std::sync::LazyLock;
 
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 use pulp::Arch;
@@ -13,7 +15,10 @@ use crate::simd::{Portable, Simd, WithSimd};
 
 /// A level of vector instructions that this processor has.
 #[derive(Clone, Copy)]
-pub struct Isa(Level);
+pub struct Isa {
+    level: Level,
+    avoids_subnormals: bool,
+}
 
 #[derive(Clone, Copy)]
 enum Level {
@@ -46,12 +51,12 @@ impl Isa {
             let neon = pulp::aarch64::Neon::try_new().map(Arch::Neon);
             portable.chain(neon.into_iter().map(Level::Fused))
         };
-        levels.map(Self).collect()
+        levels.map(|level| Self { level, avoids_subnormals: is_slow_with(level) }).collect()
     }
 
     /// `portable`, `avx2` (with FMA), `avx512` or `neon`.
     pub fn name(self) -> &'static str {
-        match self.0 {
+        match self.level {
             Level::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
             Level::Fused(Arch::V3(_)) => "avx2",
@@ -66,7 +71,7 @@ impl Isa {
 
     /// Runs an operation, compiled for this level.
     pub fn run<Op: WithSimd>(self, operation: Op) -> Op::Output {
-        match self.0 {
+        match self.level {
             Level::Portable => operation.with_simd(Portable),
             #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
             Level::Fused(arch) => arch.dispatch(ByPulp(operation)),
@@ -75,7 +80,18 @@ impl Isa {
 
     /// Whether one instruction multiplies and adds.
     pub fn is_fused(self) -> bool {
-        !matches!(self.0, Level::Portable)
+        !matches!(self.level, Level::Portable)
+    }
+
+    /// Whether products with subnormal numbers, those below 2^-126, are so slow on this processor
+    /// that a detour around them is worth twice the instructions. True for Intel's.
+    pub fn avoids_subnormals(self) -> bool {
+        self.avoids_subnormals
+    }
+
+    /// This level, with detours around subnormal numbers or without them.
+    pub fn avoiding_subnormals(self, avoids_subnormals: bool) -> Self {
+        Self { avoids_subnormals, ..self }
     }
 
     /// Number of f32 lanes per vector.
@@ -89,6 +105,22 @@ impl Isa {
         }
         self.run(VectorLen)
     }
+}
+
+/// Whether this processor takes a hundred cycles and more for a product with a subnormal number.
+/// Detours have fused multiply-adds, so that the portable level has none.
+#[cfg(target_arch = "x86_64")]
+fn is_slow_with(level: Level) -> bool {
+    static IS_INTEL: LazyLock<bool> = LazyLock::new(|| {
+        let vendor = raw_cpuid::CpuId::new().get_vendor_info();
+        vendor.is_some_and(|vendor| vendor.as_str() == "GenuineIntel")
+    });
+    matches!(level, Level::Fused(_)) && *IS_INTEL
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn is_slow_with(_: Level) -> bool {
+    false
 }
 
 impl fmt::Debug for Isa {

@@ -99,6 +99,8 @@ operations! {
     fn max_f32s(a: Self::f32s, b: Self::f32s) -> Self::f32s;
     /// -a
     fn neg_f32s(a: Self::f32s) -> Self::f32s;
+    /// The bits that both have.
+    fn and_f32s(a: Self::f32s, b: Self::f32s) -> Self::f32s;
     /// The square root.
     fn sqrt_f32s(a: Self::f32s) -> Self::f32s;
     /// a = b

@@ -65,6 +65,11 @@ impl Simd for Portable {
         cast(vector::negate(cast(a)))
     }
     #[inline(always)]
+    fn and_f32s(self, a: Self::f32s, b: Self::f32s) -> Self::f32s {
+        let (a, b) = (cast::<_, [u32; 4]>(a), cast::<_, [u32; 4]>(b));
+        cast([a[0] & b[0], a[1] & b[1], a[2] & b[2], a[3] & b[3]])
+    }
+    #[inline(always)]
     fn sqrt_f32s(self, a: Self::f32s) -> Self::f32s {
         cast(vector::sqrt(cast(a)))
     }

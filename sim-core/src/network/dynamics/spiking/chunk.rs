@@ -5,12 +5,14 @@ use determinism::simd::{Simd, WithSimd};
 use super::super::aligned::Aligned;
 use super::super::learning::Memory;
 use super::super::{Inputs, SpikeWindow};
-use super::circuit::{Circuit, weight};
+use super::circuit::{Circuit, Filter, weight};
 use super::encoding::EncoderState;
+use super::functions::risen;
 use super::model::Model;
 use super::neurons::Neurons;
-use super::receptors::ReceptorState;
-use super::row::Row;
+use super::receptors::{ReceptorState, Receptors};
+use super::row::{Mask, Row, vectors, vectors_mut};
+use super::subnormal::{self, agree, is_tiny, product};
 use crate::lanes::Lanes;
 use determinism::Isa;
 
@@ -74,6 +76,8 @@ pub(super) struct Chunk {
     drive: Aligned,
     /// `[neuron][lane]`
     current: Aligned,
+    /// Whether decoders' filters take detours around subnormal numbers.
+    avoids_subnormals: bool,
     /// The state of dynamic synapses.
     receptors: Option<ReceptorState>,
     encoders: EncoderState,
@@ -121,6 +125,8 @@ impl Chunk {
         let n_lanes = width * isa.vector_len();
         let rows = |n: usize| Aligned::new(n * n_lanes);
         let (n_neurons, n_sources) = (circuit.n_neurons, circuit.n_sources());
+        // Plastic weights have no detours: the sign of such a weight differs between lanes.
+        let has_detours = isa.avoids_subnormals() && circuit.rule.is_none();
         let mut chunk = Self {
             first_lane,
             width,
@@ -131,7 +137,11 @@ impl Chunk {
             active: Active::new(n_sources),
             drive: rows(n_neurons),
             current: rows(n_neurons),
-            receptors: circuit.receptors.as_ref().map(|_| ReceptorState::new(n_sources, n_lanes)),
+            avoids_subnormals: isa.avoids_subnormals(),
+            receptors: circuit
+                .receptors
+                .as_ref()
+                .map(|_| ReceptorState::new(n_sources, n_lanes, has_detours)),
             encoders: EncoderState::new(&circuit.encoders, n_lanes),
             memory: circuit.rule.as_ref().map(|rule| Memory::new(rule, n_lanes)),
             counts: rows(n_sources),
@@ -179,7 +189,13 @@ impl Chunk {
             let draws = inputs.draws;
             let propagate = Propagate::<W, PLASTIC> { circuit, chunk: self, draws, substep };
             isa.run(InRows::<_, W>(propagate));
-            isa.run(InRows::<_, W>(Integrate::<M, C, Z, W> { neurons, chunk: self }));
+            if self.receptors.as_ref().is_some_and(ReceptorState::is_tiny) {
+                let integrate = Integrate::<_, C, Z, W, true> { circuit, neurons, chunk: self };
+                isa.run(InRows::<_, W>(integrate));
+            } else {
+                let integrate = Integrate::<_, C, Z, W, false> { circuit, neurons, chunk: self };
+                isa.run(InRows::<_, W>(integrate));
+            }
             isa.run(InRows::<_, W>(Listen::<W> { circuit, chunk: self, substep }));
         }
         if PLASTIC && let (Some(rule), Some(memory)) = (&circuit.rule, &mut self.memory) {
@@ -274,7 +290,8 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
 }
 
 /// Computes the spikes of encoders' nodes in a substep, and the current of every neuron from
-/// these and from the neurons' spikes in the previous substep.
+/// these and from the neurons' spikes in the previous substep. It leaves currents through tiny
+/// receptors to [`Integrate`].
 struct Propagate<'a, const W: usize, const PLASTIC: bool> {
     circuit: &'a Circuit,
     chunk: &'a mut Chunk,
@@ -307,8 +324,17 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Propagate<'_, W, PLASTIC>
             }
         }
         if let (Some(receptors), Some(held)) = (&circuit.receptors, &mut chunk.receptors) {
-            let states = (vectors::<S, W>(chunk.state.values()), chunk.n_variables);
-            receptors.propagate::<S, W, PLASTIC>(simd, plastic, held, spikes, states, currents);
+            receptors.open::<S, W>(simd, held, spikes);
+            if S::IS_FUSED && held.is_tiny() {
+                return;
+            }
+            let states = vectors::<S, W>(chunk.state.values());
+            for (neuron, current) in currents.iter_mut().enumerate() {
+                let at = (neuron, Row::new(simd, states[neuron * chunk.n_variables]));
+                let before = Row::new(simd, *current);
+                let after = receptors.add_flows::<S, W, PLASTIC>(simd, plastic, held, at, before);
+                *current = after.vectors;
+            }
         }
     }
 }
@@ -334,20 +360,22 @@ fn encode<S: Simd, const W: usize>(
     }
 }
 
-/// One Euler step of every neuron.
-struct Integrate<'a, M, const C: usize, const Z: usize, const W: usize> {
+/// One Euler step of every neuron. If TINY, their currents lack those through receptors, which may
+/// be subnormal.
+struct Integrate<'a, M, const C: usize, const Z: usize, const W: usize, const TINY: bool> {
+    circuit: &'a Circuit,
     neurons: &'a Neurons<M, C, Z>,
     chunk: &'a mut Chunk,
 }
 
-impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
-    for Integrate<'_, M, C, Z, W>
+impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize, const TINY: bool> WithSimd
+    for Integrate<'_, M, C, Z, W, TINY>
 {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { neurons, chunk } = self;
+        let Self { circuit, neurons, chunk } = self;
         let (zero, one) = (Row::splat(simd, 0.0), Row::splat(simd, 1.0));
         let states = vectors_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<Z>().0;
         let currents = vectors::<S, W>(chunk.current.values());
@@ -364,7 +392,14 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
                 *value = Row::new(simd, vectors);
             }
             let current = Row::new(simd, currents[neuron]);
-            let (state, spiked) = M::update(splat, state, current);
+            let (state, spiked) = if S::IS_FUSED
+                && TINY
+                && let (Some(receptors), Some(held)) = (&circuit.receptors, &chunk.receptors)
+            {
+                update_by_bounds::<S, M, C, Z, W>(receptors, held, neuron, splat, state, current)
+            } else {
+                M::update(splat, state, current)
+            };
             for (vectors, value) in states[neuron].iter_mut().zip(state) {
                 *vectors = value.vectors;
             }
@@ -373,6 +408,30 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
             counts[neuron] = (Row::new(simd, counts[neuron]) + spike).vectors;
             chunk.active.push_if(spiked.is_any(), neuron);
         }
+    }
+}
+
+/// One Euler step of a neuron with a current and those through its receptors. Computes the step
+/// from two bounds of their sum, and only if these disagree about any lane, from the sum itself.
+#[inline(always)]
+fn update_by_bounds<S: Simd, M: Model<C, Z>, const C: usize, const Z: usize, const W: usize>(
+    receptors: &Receptors,
+    held: &ReceptorState,
+    neuron: usize,
+    constants: [Row<S, W>; C],
+    state: [Row<S, W>; Z],
+    current: Row<S, W>,
+) -> ([Row<S, W>; Z], Mask<S, W>) {
+    let (simd, at) = (current.simd, (neuron, state[0]));
+    let [low, high] = receptors.add_bounds_of_flows(simd, held, at, current);
+    let (from_low, low_spiked) = M::update(constants, state, low);
+    let (from_high, high_spiked) = M::update(constants, state, high);
+    let is_decided = agree([from_low[0], from_high[0]]).and(low_spiked.equals(high_spiked));
+    if is_decided.is_all() {
+        (from_low, low_spiked)
+    } else {
+        let sum = receptors.add_flows::<S, W, false>(simd, &[], held, at, current);
+        M::update(constants, state, sum)
     }
 }
 
@@ -391,8 +450,8 @@ impl<const W: usize> WithSimd for Listen<'_, W> {
         let Self { circuit, chunk, substep } = self;
         let one = Row::splat(simd, 1.0);
         let retention = Row::splat(simd, circuit.filter.retention);
-        let (rise, decay) =
-            (Row::splat(simd, circuit.filter.rise), Row::splat(simd, circuit.filter.decay));
+        let Filter { rise, decay, .. } = circuit.filter;
+        let rates = [Row::splat(simd, rise), Row::splat(simd, decay)];
         let now = Row::splat(simd, substep as f32);
         let spikes = vectors::<S, W>(chunk.spikes.values());
         let first = vectors_mut::<S, W>(chunk.first.values_mut());
@@ -405,21 +464,14 @@ impl<const W: usize> WithSimd for Listen<'_, W> {
         for (&neuron, filtered) in circuit.filtered.iter().zip(filter) {
             let spiked = Row::new(simd, spikes[neuron]).equals(one);
             let (x, a) = (Row::new(simd, filtered[0]), Row::new(simd, filtered[1]));
-            let x = spiked.select(one, x * retention);
-            let a = a + (rise * x * (one - a) - decay * a);
+            let [x, a] = if S::IS_FUSED && chunk.avoids_subnormals && is_tiny(x.min(a)).is_any() {
+                let x = spiked.select(one, product(x, retention));
+                [x, subnormal::risen(a, x, rates)]
+            } else {
+                let x = spiked.select(one, x * retention);
+                [x, risen(a, x, rates)]
+            };
             *filtered = [x.vectors, a.vectors];
         }
     }
-}
-
-/// Values as rows of W vectors.
-#[inline(always)]
-fn vectors<S: Simd, const W: usize>(values: &[f32]) -> &[[S::f32s; W]] {
-    S::as_simd_f32s(values).0.as_chunks().0
-}
-
-/// Values as rows of W vectors.
-#[inline(always)]
-fn vectors_mut<S: Simd, const W: usize>(values: &mut [f32]) -> &mut [[S::f32s; W]] {
-    S::as_mut_simd_f32s(values).0.as_chunks_mut().0
 }

@@ -21,6 +21,7 @@ mod morris_lecar;
 mod neurons;
 mod receptors;
 mod row;
+mod subnormal;
 mod wiring;
 
 use super::{Dynamics, Inputs, SpikeWindow};

@@ -24,6 +24,10 @@ pub(super) trait Model<const C: usize, const Z: usize>: fmt::Debug {
 
     /// One explicit Euler step with a synaptic current. Returns the new state, and the lanes with
     /// a spike.
+    ///
+    /// Spikes are monotone in the current, and so is the new voltage where spikes are the same. Other
+    /// variables depend on the current by the spike alone. So if two currents have the same result,
+    /// all currents between them have it, too.
     fn update<S: Simd, const W: usize>(
         constants: [Row<S, W>; C],
         state: [Row<S, W>; Z],

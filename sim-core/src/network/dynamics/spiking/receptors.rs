@@ -14,8 +14,9 @@ use determinism::simd::Simd;
 use super::super::aligned::Aligned;
 use super::blueprint::links;
 use super::circuit::{Weighted, weight};
-use super::functions::exp;
-use super::row::Row;
+use super::functions::{exp, risen};
+use super::row::{Row, vectors, vectors_mut};
+use super::subnormal::{self, bounds, is_tiny, product};
 use super::wiring::Wiring;
 use crate::blueprint;
 use crate::network::Phenotype;
@@ -23,6 +24,8 @@ use experiment_file::{SynapseParams, limits};
 
 /// Variables of an axon: s_ampa, s_gaba, x, s_nmda.
 const N_VARIABLES: usize = 4;
+/// Substeps from one check to the next of whether detours around subnormal numbers save time.
+const SUBSTEPS_PER_CHECK: usize = 8;
 /// Number of substeps for which spikes are stored: the longest delay.
 const N_SLOTS: usize = *limits::DELAYS.end() as usize;
 
@@ -53,6 +56,11 @@ pub(super) struct ReceptorState {
     history: Aligned,
     /// `[axon][variable][lane]`
     open: Aligned,
+    avoids_subnormals: bool,
+    /// Whether any variable was tiny at the last check. A wrong answer costs time, but no bit.
+    is_tiny: bool,
+    /// Bounds of the variables, up to date while `is_tiny`: `[axon][variable][bound][lane]`.
+    enclosed: Aligned,
 }
 
 impl Receptors {
@@ -81,70 +89,147 @@ impl Receptors {
         }
     }
 
-    /// Adds the synaptic currents of a substep. `spikes`: of neurons in the previous substep, and
-    /// of nodes of encoders in this substep. `states`: the variables of the neurons, `n_variables`
-    /// each, v first. `weights`: those of plastic synapses, by their number.
+    /// Opens the receptors of axons on which a spike arrives, and closes the others a bit. `spikes`:
+    /// of neurons in the previous substep, and of nodes of encoders in this substep.
     #[inline(always)]
-    pub fn propagate<S: Simd, const W: usize, const PLASTIC: bool>(
+    pub fn open<S: Simd, const W: usize>(
         &self,
         simd: S,
-        weights: &[[S::f32s; W]],
         held: &mut ReceptorState,
         spikes: &[[S::f32s; W]],
-        (states, n_variables): (&[[S::f32s; W]], usize),
-        currents: &mut [[S::f32s; W]],
+    ) {
+        if held.avoids_subnormals && held.clock.is_multiple_of(SUBSTEPS_PER_CHECK) {
+            held.is_tiny = false;
+            for &variable in vectors::<S, W>(held.open.values()) {
+                held.is_tiny |= is_tiny(Row::new(simd, variable)).is_any();
+            }
+        }
+        if S::IS_FUSED && held.is_tiny {
+            self.open_by::<S, W, true>(simd, held, spikes);
+        } else {
+            self.open_by::<S, W, false>(simd, held, spikes);
+        }
+        held.clock += 1;
+    }
+
+    /// [`open`](Self::open), with detours around subnormal numbers or without.
+    #[inline(always)]
+    fn open_by<S: Simd, const W: usize, const DETOURS: bool>(
+        &self,
+        simd: S,
+        held: &mut ReceptorState,
+        spikes: &[[S::f32s; W]],
     ) {
         let n_axons = spikes.len();
-        let history: &mut [[S::f32s; W]] =
-            S::as_mut_simd_f32s(held.history.values_mut()).0.as_chunks_mut().0;
+        let history = vectors_mut::<S, W>(held.history.values_mut());
         let slot = |age: usize| (held.clock + N_SLOTS - age) % N_SLOTS * n_axons;
         history[slot(0)..][..n_axons].copy_from_slice(spikes);
-        let open: &mut [[S::f32s; W]] =
-            S::as_mut_simd_f32s(held.open.values_mut()).0.as_chunks_mut().0;
-        let open = open.as_chunks_mut::<N_VARIABLES>().0;
+        let open = vectors_mut::<S, W>(held.open.values_mut()).as_chunks_mut::<N_VARIABLES>().0;
+        let enclosed = vectors_mut::<S, W>(held.enclosed.values_mut());
+        let enclosed = enclosed.as_chunks_mut::<2>().0.as_chunks_mut::<N_VARIABLES>().0;
         let one = Row::splat(simd, 1.0);
         let [left_ampa, left_gaba, left_x] = self.retention;
-        let (rise, decay) = (Row::splat(simd, self.rise), Row::splat(simd, self.decay));
-        for (axon, [ampa, gaba, x, nmda]) in open.iter_mut().enumerate() {
+        let rates = [Row::splat(simd, self.rise), Row::splat(simd, self.decay)];
+        for (axon, variables) in open.iter_mut().enumerate() {
             // A delay of 1 equals the delay of a static synapse.
             let arrived = Row::new(simd, history[slot(self.delays[axon] - 1) + axon]);
             let spiked = arrived.equals(one);
+            let [ampa, gaba, x, nmda] = variables;
             for (variable, left) in [(ampa, left_ampa), (gaba, left_gaba), (&mut *x, left_x)] {
-                let closed = Row::new(simd, *variable) * Row::splat(simd, left);
+                let (before, left) = (Row::new(simd, *variable), Row::splat(simd, left));
+                let closed = if DETOURS { product(before, left) } else { before * left };
                 *variable = spiked.select(one, closed).vectors;
             }
             let (x, s) = (Row::new(simd, *x), Row::new(simd, *nmda));
-            *nmda = (s + (rise * x * (one - s) - decay * s)).vectors;
+            let risen = if DETOURS { subnormal::risen(s, x, rates) } else { risen(s, x, rates) };
+            *nmda = risen.vectors;
+            if DETOURS {
+                for (bounded, &mut variable) in enclosed[axon].iter_mut().zip(variables) {
+                    let [low, high] = bounds(Row::new(simd, variable));
+                    *bounded = [low.vectors, high.vectors];
+                }
+            }
         }
-        held.clock += 1;
-        for (neuron, current) in currents.iter_mut().enumerate() {
-            for (receptor, (incoming, (gain, reversal))) in
-                self.incoming.iter().zip(self.drives).enumerate()
-            {
-                let synapses = incoming.synapses_of(neuron);
-                if synapses.is_empty() {
-                    continue;
+    }
+
+    /// Adds the flows through all receptors of a neuron with voltage v to its current. `weights`:
+    /// those of plastic synapses, by their number.
+    #[inline(always)]
+    pub fn add_flows<S: Simd, const W: usize, const PLASTIC: bool>(
+        &self,
+        simd: S,
+        weights: &[[S::f32s; W]],
+        held: &ReceptorState,
+        at: (usize, Row<S, W>),
+        current: Row<S, W>,
+    ) -> Row<S, W> {
+        let open = vectors::<S, W>(held.open.values()).as_chunks().0.as_chunks().0;
+        self.add_flows_of::<S, W, 1, PLASTIC>(simd, weights, open, at, [current])[0]
+    }
+
+    /// A lower and an upper bound of [`add_flows`](Self::add_flows), without subnormal numbers.
+    #[inline(always)]
+    pub fn add_bounds_of_flows<S: Simd, const W: usize>(
+        &self,
+        simd: S,
+        held: &ReceptorState,
+        at: (usize, Row<S, W>),
+        current: Row<S, W>,
+    ) -> [Row<S, W>; 2] {
+        let open = vectors::<S, W>(held.enclosed.values()).as_chunks().0.as_chunks().0;
+        self.add_flows_of::<S, W, 2, false>(simd, &[], open, at, [current; 2])
+    }
+
+    /// Adds flows. `open`: N values of each variable of each axon, either the exact one or a lower
+    /// and an upper bound; likewise `currents`.
+    #[inline(always)]
+    fn add_flows_of<S: Simd, const W: usize, const N: usize, const PLASTIC: bool>(
+        &self,
+        simd: S,
+        weights: &[[S::f32s; W]],
+        open: &[[[[S::f32s; W]; N]; N_VARIABLES]],
+        (neuron, v): (usize, Row<S, W>),
+        mut currents: [Row<S, W>; N],
+    ) -> [Row<S, W>; N] {
+        for (receptor, (incoming, (gain, reversal))) in
+            self.incoming.iter().zip(self.drives).enumerate()
+        {
+            let synapses = incoming.synapses_of(neuron);
+            if synapses.is_empty() {
+                continue;
+            }
+            // s_ampa, s_gaba, s_nmda: x is between the last two.
+            let variable = receptor + usize::from(receptor == 2);
+            let mut flows = [Row::splat(simd, 0.0); N];
+            for (&(pre, shared), &number) in synapses.iter().zip(incoming.numbers_of(neuron)) {
+                let weight = weight::<S, W, PLASTIC>(simd, shared, number, weights);
+                let open = &open[pre as usize][variable];
+                for (bound, sum) in flows.iter_mut().enumerate() {
+                    // A negative weight makes the lower bound from the upper one.
+                    let bound = if shared < 0.0 { N - 1 - bound } else { bound };
+                    *sum = weight.mul_add(Row::new(simd, open[bound]), *sum);
                 }
-                // s_ampa, s_gaba, s_nmda: x is between the last two.
-                let variable = receptor + usize::from(receptor == 2);
-                let mut sum = Row::splat(simd, 0.0);
-                for (&(pre, shared), &number) in synapses.iter().zip(incoming.numbers_of(neuron)) {
-                    let weight = weight::<S, W, PLASTIC>(simd, shared, number, weights);
-                    sum = weight.mul_add(Row::new(simd, open[pre as usize][variable]), sum);
-                }
-                let v = Row::new(simd, states[neuron * n_variables]);
-                let mut flow = Row::splat(simd, gain) * sum;
+            }
+            for flow in &mut flows {
+                *flow = Row::splat(simd, gain) * *flow;
                 if let Some(reversal) = reversal {
-                    flow = flow * (Row::splat(simd, reversal) - v);
+                    *flow = *flow * (Row::splat(simd, reversal) - v);
                 }
                 if receptor == 2 {
                     let block = exp(Row::splat(simd, -0.062) * v);
                     let block = Row::splat(simd, self.magnesium) * block;
-                    flow = flow / (one + block);
+                    *flow = *flow / (Row::splat(simd, 1.0) + block);
                 }
-                *current = (Row::new(simd, *current) + flow).vectors;
+            }
+            if N == 2 {
+                let [one, other] = [flows[0], flows[N - 1]];
+                (flows[0], flows[N - 1]) = (one.min(other), one.max(other));
+            }
+            for (current, flow) in currents.iter_mut().zip(flows) {
+                *current = *current + flow;
             }
         }
+        currents
     }
 }
 
@@ -159,8 +244,21 @@ impl Receptors {
 
 impl ReceptorState {
     /// The state with all receptors closed, and no spikes on their way.
-    pub fn new(n_axons: usize, n_lanes: usize) -> Self {
+    pub fn new(n_axons: usize, n_lanes: usize, avoids_subnormals: bool) -> Self {
         let rows = |n: usize| Aligned::new(n * n_axons * n_lanes);
-        Self { clock: 0, history: rows(N_SLOTS), open: rows(N_VARIABLES) }
+        let n_bounds = if avoids_subnormals { 2 * N_VARIABLES } else { 0 };
+        Self {
+            clock: 0,
+            history: rows(N_SLOTS),
+            open: rows(N_VARIABLES),
+            avoids_subnormals,
+            is_tiny: false,
+            enclosed: rows(n_bounds),
+        }
+    }
+
+    /// Whether receptors may be subnormal, so that bounds are faster than the flows through them.
+    pub fn is_tiny(&self) -> bool {
+        self.is_tiny
     }
 }

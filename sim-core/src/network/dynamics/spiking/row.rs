@@ -129,6 +129,10 @@ impl<S: Simd, const W: usize> Row<S, W> {
         /// The smaller of both; `other` where self is NaN.
         pub min = min_f32s
     );
+    binary!(
+        /// The bits that both have.
+        pub common_bits = and_f32s
+    );
     comparison!(
         /// self >= other
         reaches = greater_than_or_equal_f32s
@@ -162,6 +166,24 @@ impl<S: Simd, const W: usize> Mask<S, W> {
         self
     }
 
+    /// Where both are true, or both are false.
+    #[inline(always)]
+    pub fn equals(self, other: Self) -> Self {
+        self.as_numbers().equals(other.as_numbers())
+    }
+
+    /// 1 where the mask is true, 0 elsewhere.
+    #[inline(always)]
+    pub fn as_numbers(self) -> Row<S, W> {
+        self.select(Row::splat(self.simd, 1.0), Row::splat(self.simd, 0.0))
+    }
+
+    /// Whether all lanes are true.
+    #[inline(always)]
+    pub fn is_all(self) -> bool {
+        !self.as_numbers().equals(Row::splat(self.simd, 0.0)).is_any()
+    }
+
     /// Whether any lane is true.
     #[inline(always)]
     pub fn is_any(self) -> bool {
@@ -171,4 +193,16 @@ impl<S: Simd, const W: usize> Mask<S, W> {
         }
         is_any
     }
+}
+
+/// Values as rows of W vectors.
+#[inline(always)]
+pub(super) fn vectors<S: Simd, const W: usize>(values: &[f32]) -> &[[S::f32s; W]] {
+    S::as_simd_f32s(values).0.as_chunks().0
+}
+
+/// Values as rows of W vectors.
+#[inline(always)]
+pub(super) fn vectors_mut<S: Simd, const W: usize>(values: &mut [f32]) -> &mut [[S::f32s; W]] {
+    S::as_mut_simd_f32s(values).0.as_chunks_mut().0
 }

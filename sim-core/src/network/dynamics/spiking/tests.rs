@@ -39,17 +39,38 @@ fn networks(time_scale: u32) -> Vec<(Network, Phenotype)> {
         config.topology.time_scale = time_scale;
         compiled(&config)
     });
-    let mut config = experiment_a_spiking(NeuronModel::Lif);
+    let mut config = dynamic(NeuronModel::Lif);
     config.topology.time_scale = time_scale;
+    let dynamic = compiled(&config);
+    encode(&mut config);
+    networks.chain([dynamic, compiled(&config)]).collect()
+}
+
+/// An experiment whose synapses are dynamic.
+fn dynamic(model: NeuronModel) -> ExperimentConfig {
+    let mut config = experiment_a_spiking(model);
     config.topology.synapse_model = SynapseModel::Dynamic;
     config.topology.synapse_params = Some(SynapseParams::default());
     for (index, group) in config.topology.synapses.values_mut().enumerate() {
         let transmitters = [Neurotransmitter::AmpaNmda, Neurotransmitter::Gaba];
         group.transmitter = Some(transmitters[index % 2]);
     }
-    let dynamic = compiled(&config);
-    encode(&mut config);
-    networks.chain([dynamic, compiled(&config)]).collect()
+    config
+}
+
+/// Networks of each model with receptors that close so fast that they are subnormal after 100
+/// substeps of silence, with weights that leave the bounds of many currents undecided.
+fn networks_that_fall_silent() -> Vec<(Network, Phenotype)> {
+    let networks = MODELS.into_iter().map(|model| {
+        let mut config = dynamic(model);
+        config.topology.time_scale = 20;
+        let mut params = SynapseParams::default();
+        (params.ampa.tau, params.gaba.tau) = (2.0, 3.0);
+        (params.nmda.tau_rise, params.nmda.tau_decay) = (2.0, 4.0);
+        config.topology.synapse_params = Some(params);
+        compiled(&config)
+    });
+    networks.collect()
 }
 
 /// An encoder of each scheme, with a field of each kind.
@@ -142,6 +163,44 @@ fn instruction_sets_agree_in_every_bit() {
             }
         }
     }
+}
+
+/// Some lanes fall silent while others spike.
+#[test]
+fn detours_around_subnormal_numbers_change_no_bit() {
+    let stimuli = |step: usize| {
+        let mut stimuli = stimuli(step, 0..37);
+        for lane in 0..37 {
+            if step > 2 && !(step + lane).is_multiple_of(40) {
+                (0..5).for_each(|input| stimuli.set(input, lane, 0.0));
+            }
+        }
+        stimuli
+    };
+    for network in networks_that_fall_silent() {
+        for isa in Isa::available() {
+            let mut detour = start(&network, isa.avoiding_subnormals(true), 0..37);
+            let mut plain = start(&network, isa.avoiding_subnormals(false), 0..37);
+            for step in 0..80 {
+                for state in [&mut detour, &mut plain] {
+                    state.step(&stimuli(step));
+                }
+                assert!(values(&detour, 37) == values(&plain, 37), "{isa}, step {step}");
+            }
+        }
+    }
+}
+
+/// The bits of all that can be read of a state.
+fn values(state: &NetworkState, n_lanes: usize) -> Vec<u32> {
+    let voltages = state.voltages().unwrap();
+    let window = state.window().unwrap();
+    let all = [state.activity(), &voltages, &window.counts, &window.first, &window.filtered];
+    let lanes = |lanes: &Lanes| {
+        let columns = (0..n_lanes).flat_map(|lane| lanes.column(lane).map(f32::to_bits));
+        columns.collect::<Vec<_>>()
+    };
+    all.into_iter().flat_map(lanes).collect()
 }
 
 #[test]
