@@ -1,6 +1,7 @@
 //! The wireless link between robots (section 3.3 of the thesis).
 
 mod antenna;
+mod draws;
 mod frame;
 mod hearing;
 mod quantisation;

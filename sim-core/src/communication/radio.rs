@@ -3,6 +3,7 @@
 
 use super::Mode;
 use super::antenna::Antenna;
+use super::draws::Draws;
 use super::frame::{Ether, FrameOrigin};
 use super::hearing::{Heard, Hearing, Listeners};
 use super::quantisation::Scratch;
@@ -24,12 +25,10 @@ pub(crate) struct Radio {
     reaches: Vec<f64>,
     /// Whether each robot is muted.
     silent: Vec<bool>,
-    /// Streams for the choice among valid frames, per robot.
-    reception: Vec<Stream>,
-    /// Streams for quantisation, per robot.
-    quantisation: Vec<Stream>,
-    /// The draws of a group's quantiser.
-    u: Vec<f64>,
+    /// For the choice among valid frames; empty if no robot receives.
+    reception: Draws,
+    /// For quantisation; empty if no robot quantises.
+    quantisation: Draws,
     scratch: Scratch,
     /// Scratch: the sectors of a robot whose strongest frame is valid.
     valid: Vec<usize>,
@@ -44,6 +43,9 @@ impl Radio {
         quantisation: Vec<Stream>,
     ) -> Self {
         let mut ether = Ether::new(world.n_robots(), world.message_len);
+        let only_if = |is_needed: bool, streams| if is_needed { streams } else { Vec::new() };
+        let receives = antennas.iter().any(|antenna| antenna.receiver.is_some());
+        let quantises = world.groups.iter().any(|group| group.quantiser.is_some());
         let groups = world.groups.iter().filter(|group| group.initial_frame);
         for robot in groups.flat_map(|group| group.robots.clone()) {
             ether.emit(robot, FrameOrigin::sent_by(robot), &vec![0.0; world.message_len]);
@@ -53,9 +55,8 @@ impl Radio {
             hearing: Hearing::new(antennas),
             reaches: antennas.iter().map(Antenna::reach).collect(),
             silent: vec![false; world.n_robots()],
-            reception,
-            quantisation,
-            u: Vec::new(),
+            reception: Draws::new(only_if(receives, reception)),
+            quantisation: Draws::new(only_if(quantises, quantisation)),
             scratch: Scratch::default(),
             valid: Vec::new(),
         }
@@ -86,6 +87,9 @@ impl Radio {
     /// Every receiver takes a frame from the air, chosen uniformly among the sectors whose
     /// strongest frame is valid.
     pub fn receive(&mut self, neighbours: &Neighbours, swarm: &mut Swarm) {
+        // One draw per step and robot, needed or not.
+        self.reception.advance();
+        self.quantisation.advance();
         let Self { ether, hearing, reception, valid, .. } = self;
         let message_len = swarm.message_len;
         let Swarm { received, received_messages, headings, antenna_headings, .. } = swarm;
@@ -101,8 +105,7 @@ impl Radio {
                     let is_valid = ether.is_valid(heard.robot as usize, robot, receiver.max_hops);
                     n_valid += usize::from(is_valid);
                 }
-                // One draw per step, needed or not.
-                let u = reception[robot].uniform();
+                let u = reception.of_step()[robot];
                 let message = &mut received_messages[robot * message_len..][..message_len];
                 if n_valid == 0 {
                     received[robot] = None;
@@ -192,13 +195,10 @@ impl Radio {
     /// Puts the frames of a group of robots on the air.
     pub fn emit(&mut self, isa: Isa, world: &World, swarm: &mut Swarm, group: &RobotGroup) {
         if let Some(quantiser) = &group.quantiser {
-            // One draw per step and robot, needed or not.
-            let streams = &mut self.quantisation[group.robots.clone()];
-            self.u.clear();
-            self.u.extend(streams.iter_mut().map(Stream::uniform));
+            let u = &self.quantisation.of_step()[group.robots.clone()];
             let messages =
                 group.robots.start * swarm.message_len..group.robots.end * swarm.message_len;
-            quantiser.quantise(isa, &mut swarm.messages[messages], &self.u, &mut self.scratch);
+            quantiser.quantise(isa, &mut swarm.messages[messages], u, &mut self.scratch);
         }
         for robot in group.robots.clone() {
             if world.antennas[robot].emits_within.is_some() {
