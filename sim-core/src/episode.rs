@@ -195,7 +195,7 @@ impl<'a> GroupController<'a> {
         let (activity, voltages) = (self.controller.activity(), self.controller.voltages());
         for (lane, robot) in record.robots[self.robots.clone()].iter_mut().enumerate() {
             refill(&mut robot.stimuli, Some(&self.stimuli), lane);
-            refill(&mut robot.activity, activity, lane);
+            refill(&mut robot.activity, activity.as_ref(), lane);
             refill(&mut robot.voltages, voltages.as_ref(), lane);
         }
     }

@@ -23,7 +23,7 @@ pub(crate) trait Controller {
     fn act(&mut self, lane: usize, stream: &mut Stream, action: &mut Action<'_>);
 
     /// Activities of its neurons, `[neuron][lane]`, if it has any.
-    fn activity(&self) -> Option<&Lanes> {
+    fn activity(&self) -> Option<Lanes> {
         None
     }
 

@@ -60,7 +60,7 @@ impl Controller for NeuralController<'_> {
         }
     }
 
-    fn activity(&self) -> Option<&Lanes> {
+    fn activity(&self) -> Option<Lanes> {
         Some(self.state.activity())
     }
 

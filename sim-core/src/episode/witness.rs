@@ -106,7 +106,8 @@ impl Witness {
         testimony.stimuli.clear();
         testimony.stimuli.extend(group.stimuli.column(lane));
         testimony.activity.clear();
-        testimony.activity.extend(group.controller.activity().iter().flat_map(|u| u.column(lane)));
+        let activity = group.controller.activity();
+        testimony.activity.extend(activity.iter().flat_map(|u| u.column(lane)));
         testimony.voltages.clear();
         let voltages = group.controller.voltages();
         testimony.voltages.extend(voltages.iter().flat_map(|v| v.column(lane)));

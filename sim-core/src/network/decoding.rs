@@ -112,7 +112,7 @@ impl Output {
                 self.decode_spikes(window, weights, lane, scratch);
                 self.apply(scratch, action);
             }
-            None => self.decode_activities(state.activity(), lane, stream, scratch, action),
+            None => self.decode_activities(state.motor_activity(), lane, stream, scratch, action),
         }
     }
 

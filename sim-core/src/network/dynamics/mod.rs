@@ -30,8 +30,8 @@ pub(crate) trait Dynamics: fmt::Debug {
     /// Advances by one environment step, which is `Network::n_substeps` substeps.
     fn step(&mut self, inputs: Inputs<'_>);
 
-    /// Writes the activities that outputs decode: `[neuron][lane]`.
-    fn write_activity(&self, activity: &mut Lanes);
+    /// Writes the activities of these neurons into their rows of `[neuron][lane]`.
+    fn write_activity(&self, neurons: &[usize], activity: &mut Lanes);
 
     /// Writes the spikes of the last environment step for decoders. Rate neurons have none.
     fn write_window(&self, _window: &mut SpikeWindow) {}
@@ -98,13 +98,16 @@ impl Wiring {
     }
 }
 
-/// A network with its state in every lane, and the activities of its neurons.
+/// A network with its state in every lane, and what outputs decode of it.
 #[derive(Debug)]
 pub(crate) struct NetworkState {
     dynamics: Box<dyn Dynamics>,
     n_lanes: usize,
-    /// `[neuron][lane]`. It is read for every robot, so it is not behind the trait.
-    activity: Lanes,
+    /// The neurons whose activities outputs decode; none of a spiking network.
+    motor_neurons: Vec<usize>,
+    /// Their rows of `[neuron][lane]`; the others are unused. Every robot reads them, so they are
+    /// not behind the trait.
+    motor_activity: Lanes,
     /// `None` for rate neurons.
     window: Option<SpikeWindow>,
     /// Random streams of encoders, per lane.
@@ -120,8 +123,13 @@ impl NetworkState {
     pub fn new(isa: Isa, network: &Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
         let dynamics = compile(isa, network, phenotype, n_lanes);
         let rows = || Lanes::new(network.n_neurons(), n_lanes);
-        let mut activity = rows();
-        dynamics.write_activity(&mut activity);
+        let motor_neurons = match network.model {
+            NeuronModel::Rate => {
+                network.outputs.iter().flat_map(|out| out.neurons.clone()).collect()
+            }
+            _ => Vec::new(),
+        };
+        let motor_activity = rows();
         let window = network.model.is_spiking().then(|| SpikeWindow {
             counts: rows(),
             first: rows(),
@@ -131,7 +139,8 @@ impl NetworkState {
         let rewards = Lanes::new(usize::from(network.learning.is_some()), n_lanes);
         // Draws of 1 keep nodes in lanes without a robot from spiking.
         (0..draws.n_rows()).for_each(|draw| draws.row_mut(draw).fill(1.0));
-        Self { dynamics, n_lanes, activity, window, streams: Vec::new(), draws, rewards }
+        let streams = Vec::new();
+        Self { dynamics, n_lanes, motor_neurons, motor_activity, window, streams, draws, rewards }
     }
 
     /// The same network with a stream of random numbers per lane, for encoders that draw.
@@ -155,16 +164,25 @@ impl NetworkState {
         }
         let (draws, rewards) = (&self.draws, &self.rewards);
         self.dynamics.step(Inputs { stimuli, draws, rewards });
-        self.dynamics.write_activity(&mut self.activity);
+        self.dynamics.write_activity(&self.motor_neurons, &mut self.motor_activity);
         if let Some(window) = &mut self.window {
             self.dynamics.write_window(window);
         }
     }
 
-    /// Activities of the neurons, `[neuron][lane]`; for spiking neurons, the share of substeps
-    /// with a spike.
-    pub fn activity(&self) -> &Lanes {
-        &self.activity
+    /// Activities of the rate neurons that outputs decode, after a step: their rows of
+    /// `[neuron][lane]`.
+    pub fn motor_activity(&self) -> &Lanes {
+        &self.motor_activity
+    }
+
+    /// Activities of all neurons, `[neuron][lane]`; for spiking neurons, the share of substeps with
+    /// a spike.
+    pub fn activity(&self) -> Lanes {
+        let n_neurons = self.motor_activity.n_rows();
+        let mut activity = Lanes::new(n_neurons, self.n_lanes);
+        self.dynamics.write_activity(&(0..n_neurons).collect::<Vec<_>>(), &mut activity);
+        activity
     }
 
     /// The spikes of the last environment step; `None` for rate neurons.
@@ -174,7 +192,7 @@ impl NetworkState {
 
     /// Voltages of the neurons, mV, `[neuron][lane]`; `None` for rate neurons.
     pub fn voltages(&self) -> Option<Lanes> {
-        let n_neurons = self.activity.n_rows();
+        let n_neurons = self.motor_activity.n_rows();
         let mut voltages = Lanes::new(n_neurons, self.n_lanes);
         self.dynamics.write_voltages(&mut voltages).then_some(voltages)
     }

@@ -38,18 +38,38 @@ pub(super) struct Chunk {
     state: Aligned,
     /// u, `[row][lane]`
     activity: Aligned,
+}
+
+/// What chunks need during a step only, so that they share it: it stays in a cache.
+#[derive(Debug)]
+pub(super) struct Workspace {
     /// Contribution of bias and inputs to y per substep, `[row][lane]`.
     drive: Aligned,
-    scratch: Aligned,
+    /// The next u. It takes turns with that of a chunk.
+    activity: Aligned,
+}
+
+impl Workspace {
+    /// The workspace of chunks with up to `width` vectors per row.
+    pub fn new(kernel: &Kernel, width: usize, isa: Isa) -> Self {
+        let rows = || Aligned::new(kernel.n_rows() * width * isa.vector_len());
+        Self { drive: rows(), activity: rows() }
+    }
 }
 
 impl Chunk {
-    /// A chunk at rest.
-    pub fn new(kernel: &Kernel, first_lane: usize, width: usize, isa: Isa) -> Self {
+    /// A chunk at rest, for a workspace of chunks with up to `max_width` vectors per row.
+    pub fn new(
+        kernel: &Kernel,
+        first_lane: usize,
+        width: usize,
+        max_width: usize,
+        isa: Isa,
+    ) -> Self {
+        let rows = |width| Aligned::new(kernel.n_rows() * width * isa.vector_len());
+        let (state, activity) = (rows(width), rows(max_width));
         let n_lanes = width * isa.vector_len();
-        let rows = || Aligned::new(kernel.n_rows() * n_lanes);
-        let (state, activity, drive, scratch) = (rows(), rows(), rows(), rows());
-        let mut chunk = Self { first_lane, width, n_lanes, state, activity, drive, scratch };
+        let mut chunk = Self { first_lane, width, n_lanes, state, activity };
         for (row, y) in chunk.state.values_mut().chunks_exact_mut(n_lanes).zip(kernel.starts()) {
             row.fill(y);
         }
@@ -60,14 +80,20 @@ impl Chunk {
     }
 
     /// Advances by one environment step with constant `stimuli`, `[input][lane]`.
-    pub fn advance(&mut self, kernel: &Kernel, stimuli: &Lanes, isa: Isa) {
-        self.dispatch(isa, kernel, Task::Advance(stimuli));
+    pub fn advance(
+        &mut self,
+        kernel: &Kernel,
+        workspace: &mut Workspace,
+        stimuli: &Lanes,
+        isa: Isa,
+    ) {
+        self.dispatch(isa, kernel, Task::Advance(stimuli, workspace));
     }
 
-    /// Writes the activities of neurons, given as their rows: `[neuron][lane]`.
-    pub fn write_activity(&self, rows: &[usize], activity: &mut Lanes) {
-        for (neuron, &row) in rows.iter().enumerate() {
-            let lanes = &self.activity.values()[row * self.n_lanes..][..self.n_lanes];
+    /// Writes the activities of these neurons, `[neuron][lane]`. `rows`: the row of each neuron.
+    pub fn write_activity(&self, rows: &[usize], neurons: &[usize], activity: &mut Lanes) {
+        for &neuron in neurons {
+            let lanes = &self.activity.values()[rows[neuron] * self.n_lanes..][..self.n_lanes];
             activity.row_mut(neuron)[self.first_lane..][..self.n_lanes].copy_from_slice(lanes);
         }
     }
@@ -90,7 +116,7 @@ enum Task<'a> {
     /// u = F(y).
     Activate,
     /// An environment step with these stimuli.
-    Advance(&'a Lanes),
+    Advance(&'a Lanes, &'a mut Workspace),
 }
 
 /// A task for a chunk of W vectors per row.
@@ -111,15 +137,15 @@ impl<const W: usize> WithSimd for Work<'_, W> {
         let Self { kernel, chunk, task } = self;
         match task {
             Task::Activate => activate::<S, W>(simd, kernel, chunk),
-            Task::Advance(stimuli) => {
-                perceive::<S, W>(simd, kernel, chunk, stimuli);
+            Task::Advance(stimuli, workspace) => {
+                perceive::<S, W>(simd, kernel, workspace, stimuli, chunk.first_lane);
                 for _ in 0..kernel.n_substeps {
                     if W > max_narrow(S::IS_FUSED) {
-                        integrate_wide::<S, W>(simd, kernel, chunk);
+                        integrate_wide::<S, W>(simd, kernel, chunk, workspace);
                     } else {
-                        integrate::<S, W>(simd, kernel, chunk);
+                        integrate::<S, W>(simd, kernel, chunk, workspace);
                     }
-                    mem::swap(&mut chunk.activity, &mut chunk.scratch);
+                    mem::swap(&mut chunk.activity, &mut workspace.activity);
                 }
             }
         }
@@ -144,9 +170,14 @@ fn activate<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk
 
 /// Drive of this environment step.
 #[inline(always)]
-fn perceive<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk, stimuli: &Lanes) {
-    let first_lane = chunk.first_lane;
-    let (quads, pairs) = split_mut(kernel, rows_mut::<S, W>(chunk.drive.values_mut()));
+fn perceive<S: Simd, const W: usize>(
+    simd: S,
+    kernel: &Kernel,
+    workspace: &mut Workspace,
+    stimuli: &Lanes,
+    first_lane: usize,
+) {
+    let (quads, pairs) = split_mut(kernel, rows_mut::<S, W>(workspace.drive.values_mut()));
     perceive_blocks(simd, &kernel.quads, quads, stimuli, first_lane);
     perceive_blocks(simd, &kernel.pairs, pairs, stimuli, first_lane);
 }
@@ -172,13 +203,19 @@ fn perceive_blocks<S: Simd, const W: usize, const N: usize>(
     }
 }
 
-/// One Euler step, from `activity` to `scratch`. All of y follows from the previous u.
+/// One Euler step, from the chunk's activity to that of the workspace. All of y follows from the
+/// previous u.
 #[inline(always)]
-fn integrate<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk) {
+fn integrate<S: Simd, const W: usize>(
+    simd: S,
+    kernel: &Kernel,
+    chunk: &mut Chunk,
+    workspace: &mut Workspace,
+) {
     let before = rows::<S, W>(chunk.activity.values());
-    let (quads_u, pairs_u) = split_mut(kernel, rows_mut::<S, W>(chunk.scratch.values_mut()));
+    let (quads_u, pairs_u) = split_mut(kernel, rows_mut::<S, W>(workspace.activity.values_mut()));
     let (quads_y, pairs_y) = split_mut(kernel, rows_mut::<S, W>(chunk.state.values_mut()));
-    let (quads, pairs) = split(kernel, rows::<S, W>(chunk.drive.values()));
+    let (quads, pairs) = split(kernel, rows::<S, W>(workspace.drive.values()));
     integrate_blocks(simd, &kernel.quads, before, quads, quads_y, quads_u);
     integrate_blocks(simd, &kernel.pairs, before, pairs, pairs_y, pairs_u);
 }
@@ -211,11 +248,16 @@ fn integrate_blocks<S: Simd, const W: usize, const N: usize>(
 /// [`integrate`] for wide rows, neuron by neuron. It multiplies no zeros, and needs few registers:
 /// the activities are operands in memory.
 #[inline(always)]
-fn integrate_wide<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk) {
+fn integrate_wide<S: Simd, const W: usize>(
+    simd: S,
+    kernel: &Kernel,
+    chunk: &mut Chunk,
+    workspace: &mut Workspace,
+) {
     let before = rows::<S, W>(chunk.activity.values());
-    let after = rows_mut::<S, W>(chunk.scratch.values_mut()).as_chunks_mut::<2>().0;
+    let after = rows_mut::<S, W>(workspace.activity.values_mut()).as_chunks_mut::<2>().0;
     let states = rows_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<2>().0;
-    let drives = rows::<S, W>(chunk.drive.values()).as_chunks::<2>().0;
+    let drives = rows::<S, W>(workspace.drive.values()).as_chunks::<2>().0;
     let pairs = kernel.rows.as_chunks::<2>().0.iter();
     for (((pair, y), u), drive) in pairs.zip(states).zip(after).zip(drives) {
         for (row, (y, drive)) in pair.iter().zip(y.iter_mut().zip(drive)) {

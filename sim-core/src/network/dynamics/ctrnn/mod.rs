@@ -32,7 +32,7 @@ use super::{Dynamics, Inputs};
 use crate::lanes::Lanes;
 use crate::network::{Network, Phenotype};
 pub(super) use blueprint::blueprint;
-use chunk::Chunk;
+use chunk::{Chunk, Workspace};
 use determinism::Isa;
 use kernel::Kernel;
 pub(super) use plastic::{PlasticCtrnn, blueprint as plastic_blueprint};
@@ -45,6 +45,7 @@ pub(crate) struct Ctrnn {
     isa: Isa,
     kernel: Kernel,
     chunks: Vec<Chunk>,
+    workspace: Workspace,
     /// The remaining lanes, too few for a vector.
     rest: Option<Rest>,
     /// The kernel's row of each neuron.
@@ -79,10 +80,11 @@ impl Ctrnn {
         let n_chunks = n_vectors.div_ceil(chunk::max_width(isa.is_fused()));
         let width = n_vectors.div_ceil(n_chunks.max(1)).max(1);
         let chunks = (0..n_vectors).step_by(width).map(|first| {
-            let width = width.min(n_vectors - first);
-            Chunk::new(&kernel, first * vector_len, width, isa)
+            let own_width = width.min(n_vectors - first);
+            Chunk::new(&kernel, first * vector_len, own_width, width, isa)
         });
         let chunks = chunks.collect();
+        let workspace = Workspace::new(&kernel, width, isa);
         let rest = (n_left > 0).then(|| {
             let bundles = Bundles::new(&kernel, isa);
             let first = n_vectors * vector_len;
@@ -93,14 +95,14 @@ impl Ctrnn {
             let remainders = remainders.collect();
             Rest { bundles, remainders }
         });
-        Self { isa, kernel, chunks, rest, rows: wiring.rows.clone() }
+        Self { isa, kernel, chunks, workspace, rest, rows: wiring.rows.clone() }
     }
 }
 
 impl Dynamics for Ctrnn {
     fn step(&mut self, Inputs { stimuli, .. }: Inputs<'_>) {
         for chunk in &mut self.chunks {
-            chunk.advance(&self.kernel, stimuli, self.isa);
+            chunk.advance(&self.kernel, &mut self.workspace, stimuli, self.isa);
         }
         if let Some(Rest { bundles, remainders }) = &mut self.rest {
             for remainder in remainders {
@@ -110,13 +112,13 @@ impl Dynamics for Ctrnn {
     }
 
     /// u
-    fn write_activity(&self, activity: &mut Lanes) {
+    fn write_activity(&self, neurons: &[usize], activity: &mut Lanes) {
         for chunk in &self.chunks {
-            chunk.write_activity(&self.rows, activity);
+            chunk.write_activity(&self.rows, neurons, activity);
         }
         if let Some(Rest { bundles, remainders }) = &self.rest {
             for remainder in remainders {
-                remainder.write_activity(bundles, &self.rows, activity);
+                remainder.write_activity(bundles, &self.rows, neurons, activity);
             }
         }
     }

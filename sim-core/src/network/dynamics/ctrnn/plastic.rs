@@ -157,11 +157,11 @@ impl Dynamics for PlasticCtrnn {
     }
 
     /// u
-    fn write_activity(&self, activity: &mut Lanes) {
+    fn write_activity(&self, neurons: &[usize], activity: &mut Lanes) {
         let n_lanes = self.isa.vector_len();
         for chunk in &self.chunks {
-            let rows = chunk.activity.values().chunks_exact(n_lanes).enumerate();
-            for (neuron, row) in rows {
+            for &neuron in neurons {
+                let row = &chunk.activity.values()[neuron * n_lanes..][..n_lanes];
                 activity.row_mut(neuron)[chunk.first_lane..][..n_lanes].copy_from_slice(row);
             }
         }

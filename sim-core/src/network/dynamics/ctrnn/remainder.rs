@@ -144,12 +144,19 @@ impl Remainder {
         self.dispatch(isa, bundles, Task::Advance(stimuli));
     }
 
-    /// Writes the activities of neurons, given as rows of the kernel: `[neuron][lane]`.
-    pub fn write_activity(&self, bundles: &Bundles, rows: &[usize], activity: &mut Lanes) {
+    /// Writes the activities of these neurons, `[neuron][lane]`. `rows`: the kernel's row of each
+    /// neuron.
+    pub fn write_activity(
+        &self,
+        bundles: &Bundles,
+        rows: &[usize],
+        neurons: &[usize],
+        activity: &mut Lanes,
+    ) {
         let lanes = self.activity.values().chunks_exact(bundles.len());
         for (lane, values) in (self.first_lane..).zip(lanes) {
-            for (neuron, &row) in rows.iter().enumerate() {
-                activity.set(neuron, lane, values[bundles.places[row]]);
+            for &neuron in neurons {
+                activity.set(neuron, lane, values[bundles.places[rows[neuron]]]);
             }
         }
     }

@@ -204,11 +204,11 @@ impl Chunk {
         }
     }
 
-    /// Writes the share of substeps in which each neuron spiked, `[neuron][lane]`.
-    pub fn write_activity(&self, circuit: &Circuit, activity: &mut Lanes) {
+    /// Writes the share of substeps in which these neurons spiked, `[neuron][lane]`.
+    pub fn write_activity(&self, circuit: &Circuit, neurons: &[usize], activity: &mut Lanes) {
         let n_substeps = circuit.n_substeps as f32;
-        let counts = self.counts.values().chunks_exact(self.n_lanes).take(circuit.n_neurons);
-        for (neuron, counts) in counts.enumerate() {
+        for &neuron in neurons {
+            let counts = &self.counts.values()[neuron * self.n_lanes..][..self.n_lanes];
             let row = &mut activity.row_mut(neuron)[self.first_lane..][..self.n_lanes];
             for (share, count) in row.iter_mut().zip(counts) {
                 *share = count / n_substeps;

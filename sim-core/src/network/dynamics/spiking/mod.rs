@@ -98,9 +98,9 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Dynamics for Spiking<M, C, 
     }
 
     /// Writes the share of substeps with a spike.
-    fn write_activity(&self, activity: &mut Lanes) {
+    fn write_activity(&self, neurons: &[usize], activity: &mut Lanes) {
         for chunk in &self.chunks {
-            chunk.write_activity(&self.circuit, activity);
+            chunk.write_activity(&self.circuit, neurons, activity);
         }
     }
 

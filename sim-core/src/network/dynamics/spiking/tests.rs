@@ -145,8 +145,8 @@ fn bits(
         let index = lane - lanes.start;
         let voltages = state.voltages().unwrap();
         let window = state.window().unwrap();
-        for lanes in [state.activity(), &voltages, &window.counts, &window.first, &window.filtered]
-        {
+        let activity = state.activity();
+        for lanes in [&activity, &voltages, &window.counts, &window.first, &window.filtered] {
             bits.extend(lanes.column(index).map(f32::to_bits));
         }
     }
@@ -195,7 +195,8 @@ fn detours_around_subnormal_numbers_change_no_bit() {
 fn values(state: &NetworkState, n_lanes: usize) -> Vec<u32> {
     let voltages = state.voltages().unwrap();
     let window = state.window().unwrap();
-    let all = [state.activity(), &voltages, &window.counts, &window.first, &window.filtered];
+    let activity = state.activity();
+    let all = [&activity, &voltages, &window.counts, &window.first, &window.filtered];
     let lanes = |lanes: &Lanes| {
         let columns = (0..n_lanes).flat_map(|lane| lanes.column(lane).map(f32::to_bits));
         columns.collect::<Vec<_>>()
