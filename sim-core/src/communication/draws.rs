@@ -38,7 +38,7 @@ impl Draws {
     }
 
     /// Each robot's number in this step, in \[0, 1).
-    pub fn of_step(&self) -> &[f64] {
+    pub fn current(&self) -> &[f64] {
         let n_robots = self.streams.len();
         &self.values[(N_STEPS - self.n_left) * n_robots..][..n_robots]
     }
@@ -58,7 +58,7 @@ mod tests {
         for _ in 0..3 * N_STEPS + 1 {
             draws.advance();
             let expected: Vec<f64> = streams.iter_mut().map(Stream::uniform).collect();
-            assert_eq!(draws.of_step(), expected);
+            assert_eq!(draws.current(), expected);
         }
     }
 }

@@ -105,7 +105,7 @@ impl Radio {
                     let is_valid = ether.is_valid(heard.robot as usize, robot, receiver.max_hops);
                     n_valid += usize::from(is_valid);
                 }
-                let u = reception.of_step()[robot];
+                let u = reception.current()[robot];
                 let message = &mut received_messages[robot * message_len..][..message_len];
                 if n_valid == 0 {
                     received[robot] = None;
@@ -195,7 +195,7 @@ impl Radio {
     /// Puts the frames of a group of robots on the air.
     pub fn emit(&mut self, isa: Isa, world: &World, swarm: &mut Swarm, group: &RobotGroup) {
         if let Some(quantiser) = &group.quantiser {
-            let u = &self.quantisation.of_step()[group.robots.clone()];
+            let u = &self.quantisation.current()[group.robots.clone()];
             let messages =
                 group.robots.start * swarm.message_len..group.robots.end * swarm.message_len;
             quantiser.quantise(isa, &mut swarm.messages[messages], u, &mut self.scratch);
