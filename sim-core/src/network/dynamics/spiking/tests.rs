@@ -58,8 +58,8 @@ fn dynamic(model: NeuronModel) -> ExperimentConfig {
     config
 }
 
-/// Networks of each model with receptors that close so fast that they are subnormal after 100
-/// substeps of silence, with weights that leave the bounds of many currents undecided.
+/// Networks of each model with receptors that close so fast that they are subnormal after 300
+/// substeps of silence.
 fn networks_that_fall_silent() -> Vec<(Network, Phenotype)> {
     let networks = MODELS.into_iter().map(|model| {
         let mut config = dynamic(model);
