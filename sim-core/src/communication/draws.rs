@@ -2,8 +2,8 @@
 
 use determinism::random::Stream;
 
-/// Steps whose numbers are drawn at once. Streams are large: a swarm's can exceed a cache, but its
-/// numbers for one step do not.
+/// Steps whose numbers are drawn at once. The streams of a large swarm do not fit in a cache; its
+/// numbers for one step do.
 const N_STEPS: usize = 8;
 
 /// Uniform numbers of one stream per robot.

@@ -7,12 +7,11 @@ use super::super::learning::Memory;
 use super::super::{Inputs, SpikeWindow};
 use super::circuit::{Circuit, Filter, weight};
 use super::encoding::EncoderState;
-use super::functions::risen;
 use super::model::Model;
 use super::neurons::Neurons;
 use super::receptors::{ReceptorState, Receptors};
 use super::row::{Mask, Row, vectors, vectors_mut};
-use super::subnormal::{self, agree, is_tiny, product};
+use super::subnormal::{agree, is_tiny, product, risen};
 use crate::lanes::Lanes;
 use determinism::Isa;
 
@@ -465,13 +464,16 @@ impl<const W: usize> WithSimd for Listen<'_, W> {
             let spiked = Row::new(simd, spikes[neuron]).equals(one);
             let (x, a) = (Row::new(simd, filtered[0]), Row::new(simd, filtered[1]));
             let [x, a] = if S::IS_FUSED && chunk.avoids_subnormals && is_tiny(x.min(a)).is_any() {
-                let x = spiked.select(one, product(x, retention));
-                [x, subnormal::risen(a, x, rates)]
+                let x = spiked.select(one, product::<S, W, true>(x, retention));
+                [x, risen::<S, W, true>(a, x, rates)]
             } else {
-                let x = spiked.select(one, x * retention);
-                [x, risen(a, x, rates)]
+                let x = spiked.select(one, product::<S, W, false>(x, retention));
+                [x, risen::<S, W, false>(a, x, rates)]
             };
             *filtered = [x.vectors, a.vectors];
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -31,17 +31,6 @@ pub(super) fn cosh<S: Simd, const W: usize>(x: Row<S, W>) -> Row<S, W> {
     x.constant(0.5) * (exp(x) + exp(-x))
 }
 
-/// The next value of what x raises towards 1, and what decays by itself: s + (rise x (1 - s) -
-/// decay s).
-#[inline(always)]
-pub(super) fn risen<S: Simd, const W: usize>(
-    s: Row<S, W>,
-    x: Row<S, W>,
-    [rise, decay]: [Row<S, W>; 2],
-) -> Row<S, W> {
-    s + (rise * x * (s.constant(1.0) - s) - decay * s)
-}
-
 /// s, q and f of [`Exp2`] for 2^(factor x).
 #[inline(always)]
 fn exp2_of<S: Simd, const W: usize>(x: Row<S, W>, factor: f32) -> [Row<S, W>; 3] {

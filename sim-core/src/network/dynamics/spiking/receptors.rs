@@ -14,9 +14,9 @@ use determinism::simd::Simd;
 use super::super::aligned::Aligned;
 use super::blueprint::links;
 use super::circuit::{Weighted, weight};
-use super::functions::{exp, risen};
+use super::functions::exp;
 use super::row::{Row, vectors, vectors_mut};
-use super::subnormal::{self, bounds, is_tiny, product};
+use super::subnormal::{bounds, is_tiny, product, risen};
 use super::wiring::Wiring;
 use crate::blueprint;
 use crate::network::Phenotype;
@@ -114,7 +114,7 @@ impl Receptors {
 
     /// [`open`](Self::open), with detours around subnormal numbers or without.
     #[inline(always)]
-    fn open_by<S: Simd, const W: usize, const DETOURS: bool>(
+    fn open_by<S: Simd, const W: usize, const DETOUR: bool>(
         &self,
         simd: S,
         held: &mut ReceptorState,
@@ -137,13 +137,12 @@ impl Receptors {
             let [ampa, gaba, x, nmda] = variables;
             for (variable, left) in [(ampa, left_ampa), (gaba, left_gaba), (&mut *x, left_x)] {
                 let (before, left) = (Row::new(simd, *variable), Row::splat(simd, left));
-                let closed = if DETOURS { product(before, left) } else { before * left };
+                let closed = product::<S, W, DETOUR>(before, left);
                 *variable = spiked.select(one, closed).vectors;
             }
             let (x, s) = (Row::new(simd, *x), Row::new(simd, *nmda));
-            let risen = if DETOURS { subnormal::risen(s, x, rates) } else { risen(s, x, rates) };
-            *nmda = risen.vectors;
-            if DETOURS {
+            *nmda = risen::<S, W, DETOUR>(s, x, rates).vectors;
+            if DETOUR {
                 for (bounded, &mut variable) in enclosed[axon].iter_mut().zip(variables) {
                     let [low, high] = bounds(Row::new(simd, variable));
                     *bounded = [low.vectors, high.vectors];
@@ -255,6 +254,12 @@ impl ReceptorState {
             is_tiny: false,
             enclosed: rows(n_bounds),
         }
+    }
+
+    /// `[axon][variable][lane]`
+    #[cfg(test)]
+    pub fn variables_mut(&mut self) -> &mut [f32] {
+        self.open.values_mut()
     }
 
     /// Whether receptors may be subnormal, so that bounds are faster than the flows through them.

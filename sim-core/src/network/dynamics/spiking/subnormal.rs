@@ -46,13 +46,20 @@ pub(super) fn agree<S: Simd, const W: usize>([low, high]: [Row<S, W>; 2]) -> Mas
     low.equals(high).and(zero.exceeds(low.min(-low)))
 }
 
-/// x times a factor, both in \[0, 1\].
-///
+/// x times a factor, both in \[0, 1\], by a detour if DETOUR.
+#[inline(always)]
+pub(super) fn product<S: Simd, const W: usize, const DETOUR: bool>(
+    x: Row<S, W>,
+    factor: Row<S, W>,
+) -> Row<S, W> {
+    if DETOUR { product_of_scaled(x, factor) } else { x * factor }
+}
+
 /// The multiply-add of the scaled x adds 2^-66, and so rounds to multiples of 2^-89, as a product
 /// without the scale rounds to multiples of 2^-149. It ends in \[2^-66, 2^-65): scaled back, its
 /// exponent is that of 2^-126, and its other bits are the subnormal product.
 #[inline(always)]
-pub(super) fn product<S: Simd, const W: usize>(x: Row<S, W>, factor: Row<S, W>) -> Row<S, W> {
+fn product_of_scaled<S: Simd, const W: usize>(x: Row<S, W>, factor: Row<S, W>) -> Row<S, W> {
     let (zero, normal) = (x.constant(0.0), x.constant(NORMAL));
     let (scale, scaled_normal) = (x.constant(SCALE), x.constant(NORMAL * SCALE));
     let is_subnormal = normal.exceeds(x);
@@ -67,14 +74,16 @@ pub(super) fn product<S: Simd, const W: usize>(x: Row<S, W>, factor: Row<S, W>) 
     x.constant(2.0 * NORMAL * SCALE).exceeds(above).select(subnormal, other)
 }
 
-/// [`functions::risen`](super::functions::risen) by [`product`].
+/// The next value of s, which x raises towards 1, and which decays: s + (rise x (1 - s) - decay s).
+/// All are in \[0, 1\].
 #[inline(always)]
-pub(super) fn risen<S: Simd, const W: usize>(
+pub(super) fn risen<S: Simd, const W: usize, const DETOUR: bool>(
     s: Row<S, W>,
     x: Row<S, W>,
     [rise, decay]: [Row<S, W>; 2],
 ) -> Row<S, W> {
-    s + (product(product(x, rise), s.constant(1.0) - s) - product(s, decay))
+    let rising = product::<S, W, DETOUR>(product::<S, W, DETOUR>(x, rise), s.constant(1.0) - s);
+    s + (rising - product::<S, W, DETOUR>(s, decay))
 }
 
 #[cfg(test)]
@@ -83,7 +92,6 @@ mod tests {
     use determinism::random::{Purpose, Stream};
     use determinism::simd::{WithSimd, bytemuck};
 
-    use super::super::functions;
     use super::*;
 
     /// The first number between its bounds, and both ways to compute a product and a rise.
@@ -99,9 +107,11 @@ mod tests {
                 let [x, factor, other] = [x, factor, other].map(|row| Row::new(simd, [*row]));
                 let [low, high] = bounds(x);
                 let rates = [factor, other];
-                let [detour, plain] = [product(x, factor), x * factor];
-                let [risen, plainly] = [risen(x, other, rates), functions::risen(x, other, rates)];
-                let rows = [low, x, high, detour, plain, risen, plainly];
+                let detour = product::<S, 1, true>(x, factor);
+                let plain = product::<S, 1, false>(x, factor);
+                let risen_by_detour = risen::<S, 1, true>(x, other, rates);
+                let plainly_risen = risen::<S, 1, false>(x, other, rates);
+                let rows = [low, x, high, detour, plain, risen_by_detour, plainly_risen];
                 rows.map(|row| bytemuck::cast_slice(&row.vectors).to_vec())
             });
             rows.collect()
