@@ -104,10 +104,10 @@ fn kernel(isas: &[Isa]) {
 }
 
 /// Networks of spiking neurons and, for comparison, of rate neurons in the same task, with random
-/// genotypes.
+/// genotypes, without and with detours around subnormal numbers.
 fn spiking(isas: &[Isa]) {
     println!("\nspiking: networks of experiment A, 50 lanes, us per lane and environment step");
-    print!("{:10}", "");
+    print!("{:15}", "");
     let mut configs = vec![("rate_model".to_owned(), experiment_a())];
     for model in NeuronModel::ALL.into_iter().filter(|model| model.is_spiking()) {
         configs.push((model.name().to_owned(), spiking_a(model, SynapseModel::Static)));
@@ -118,8 +118,11 @@ fn spiking(isas: &[Isa]) {
     configs.push(("lif, learns".to_owned(), plastic(&lif)));
     configs.push(("rate, learns".to_owned(), plastic(&experiment_a())));
     println!("{}", configs.iter().map(|(name, _)| format!(" {name:>13}")).collect::<String>());
-    for &isa in isas {
-        print!("{:10}", isa.name());
+    let plain = isas.iter().map(|isa| (isa.name().to_owned(), isa.avoiding_subnormals(false)));
+    let fused = isas.iter().filter(|isa| isa.is_fused());
+    let detours = fused.map(|isa| (format!("{isa}, detours"), isa.avoiding_subnormals(true)));
+    for (name, isa) in plain.chain(detours) {
+        print!("{name:15}");
         for (_, config) in &configs {
             let simulation = compile(config, isa);
             let n_lanes = 50;
