@@ -216,7 +216,7 @@ impl<'a> Trial<'a> {
             }
         }
         if let (true, Some(audible), Some(interior)) = (moved, &mut self.audible, &self.interior) {
-            audible.clone_from(&self.neighbours);
+            audible.copy(&self.neighbours);
             interior.retain_audible(self.world, &self.swarm.positions, audible);
         }
         let audible = self.audible.as_ref().unwrap_or(&self.neighbours);
