@@ -72,6 +72,8 @@ struct Here {
 pub struct Connection {
     /// The coordinator's address, or the data directory.
     address: String,
+    /// The option that names the place, unless commands find the place by themselves.
+    place: Option<[String; 2]>,
     way: Way,
     client: ExperimentServiceClient<Authorised>,
     evaluations: EvaluationServiceClient<Authorised>,
@@ -97,7 +99,10 @@ impl Connection {
     pub async fn to(place: Place, intent: Intent) -> Result<Self, Error> {
         let path = match place {
             Place::Coordinator(settings) => {
-                return Self::new(settings.address(), &settings.credentials()?);
+                let connection = Self::new(settings.address(), &settings.credentials()?)?;
+                let said = settings.is_coordinator_said.then_some("--coordinator");
+                let place = said.map(|option| [option, settings.address()].map(str::to_owned));
+                return Ok(Self { place, ..connection });
             }
             Place::Directory { path, .. } => path,
         };
@@ -122,8 +127,10 @@ impl Connection {
         let here = Here { data_dir: data_dir.into(), door, services, set_going: Mutex::default() };
         let address = data_dir.display().to_string();
         // A failure in this process is not transient.
+        let is_default = data_dir == Path::new(DEFAULT_DATA_DIR);
+        let place = (!is_default).then(|| ["--data-dir".to_owned(), address.clone()]);
         let this = Self::on(address, Way::Here(Arc::new(here)), &channel);
-        this.with_patience(Duration::ZERO)
+        Self { place, ..this }.with_patience(Duration::ZERO)
     }
 
     /// A connection to the coordinator at an address.
@@ -139,7 +146,7 @@ impl Connection {
         let fleet = FleetServiceClient::with_interceptor(channel.clone(), way.bearer())
             .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
-        Self { address, way, client, evaluations, fleet, patience: PATIENCE }
+        Self { address, place: None, way, client, evaluations, fleet, patience: PATIENCE }
     }
 
     /// Ends the services that this connection has started.
@@ -161,17 +168,18 @@ impl Connection {
         }
     }
 
-    /// The data directory, unless commands find it by themselves.
-    pub fn named_place(&self) -> Option<String> {
-        let data_dir = self.data_dir().filter(|path| *path != Path::new(DEFAULT_DATA_DIR))?;
-        Some(data_dir.display().to_string())
+    /// A text whose commands act in the same place.
+    pub fn in_place(&self, text: &str) -> String {
+        match &self.place {
+            Some(place) => text::in_place(text, &text::shell_command(place.clone())),
+            None => text.to_owned(),
+        }
     }
 
     /// The line of a command that acts in the same place.
     pub fn command(&self, words: &[&str]) -> String {
         let words = iter::once("swarmctl").chain(words.iter().copied()).map(str::to_owned);
-        let place = self.named_place().map(|data_dir| ["--data-dir".to_owned(), data_dir]);
-        text::shell_command(words.chain(place.into_iter().flatten()))
+        text::shell_command(words.chain(self.place.clone().into_iter().flatten()))
     }
 
     /// Whether this process, and no other, computes experiments.
@@ -234,14 +242,18 @@ impl Connection {
 
     /// A status as this program's error.
     pub fn error(&self, status: &Status) -> Error {
-        let hint = match &self.way {
-            Way::Link(link) => link.hint(status),
-            Way::Here(_) => return Error::from_status_here(status, &self.address),
+        let (error, hint) = match &self.way {
+            Way::Link(link) => (Error::from_status(status, &self.address), link.hint(status)),
+            Way::Here(_) => (Error::from_status_here(status, &self.address), None),
         };
-        match (Error::from_status(status, &self.address), hint) {
+        match (error, hint) {
             (Error::Unreachable { address, reason }, Some(hint)) => {
                 Error::Unreachable { address, reason: format!("{reason} ({hint})") }
             }
+            // The services do not know how the user reaches them.
+            (Error::Input(message), _) => Error::Input(self.in_place(&message)),
+            (Error::NotFound(message), _) => Error::NotFound(self.in_place(&message)),
+            (Error::WrongState(message), _) => Error::WrongState(self.in_place(&message)),
             (error, _) => error,
         }
     }

@@ -9,7 +9,7 @@ use swarm_proto::v1::{
     Experiment, ExperimentState, ExplainExperimentResponse, Round, WithheldWorker,
 };
 
-use crate::{clock, text};
+use crate::{clock, connection::Connection, text};
 
 /// Maximum number of listed workers, so that everything fits one screen.
 pub const WORKERS_MAX: usize = 8;
@@ -61,15 +61,12 @@ impl fmt::Display for Finding {
 }
 
 impl Finding {
-    /// Adds the data directory to the commands of the next steps, because they would not find it
-    /// by themselves.
-    pub fn name_place(&mut self, data_dir: &str) {
-        let lacks = |step: &&mut String| {
-            step.contains(": swarmctl ")
-                && !["--data-dir", "--coordinator"].iter().any(|option| step.contains(option))
-        };
-        let option = text::shell_command(["--data-dir".to_owned(), data_dir.to_owned()]);
-        self.next_steps.iter_mut().filter(lacks).for_each(|step| *step += &format!(" {option}"));
+    /// Adds the place of a connection to the commands of the next steps, because they would not
+    /// find it by themselves.
+    pub fn name_place(&mut self, connection: &Connection) {
+        for step in &mut self.next_steps {
+            *step = connection.in_place(step);
+        }
     }
 
     /// Whether it concerns the fleet, and so is the same for all experiments.

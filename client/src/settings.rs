@@ -61,6 +61,10 @@ pub struct Settings {
     pub token_file: Option<PathBuf>,
     #[command(flatten)]
     pub credentials: CredentialArgs,
+    /// Whether only the command line names the coordinator, so that a further command would not
+    /// find it by itself.
+    #[arg(skip)]
+    pub is_coordinator_said: bool,
 }
 
 /// The settings file: the same settings, under the names of their flags.
@@ -79,7 +83,9 @@ struct SettingsFile {
 impl Settings {
     /// These settings, completed from the settings file.
     pub fn or_file(self) -> Result<Self, Error> {
-        let this = self.without_empty();
+        let mut this = self.without_empty();
+        this.is_coordinator_said =
+            this.has_coordinator() && this.coordinator != env::var(COORDINATOR_VARIABLE).ok();
         let (path, must_exist) = match env::var_os(FILE_VARIABLE).filter(|path| !path.is_empty()) {
             Some(path) => (PathBuf::from(path), true),
             None => match user_file() {
@@ -144,6 +150,7 @@ impl Settings {
                 tls_domain: these.tls_domain.or(those.tls_domain),
                 plaintext: these.plaintext || those.plaintext,
             },
+            is_coordinator_said: self.is_coordinator_said,
         }
     }
 }
@@ -163,6 +170,7 @@ impl SettingsFile {
                 tls_domain: self.tls_domain,
                 plaintext: self.plaintext,
             },
+            is_coordinator_said: false,
         }
     }
 }
@@ -219,6 +227,7 @@ mod tests {
             "tls-cert": "c.pem", "tls-key": "c.key", "tls-domain": "name", "plaintext": true
         }"#;
         let expected = Settings {
+            is_coordinator_said: false,
             coordinator: Some("https://h:1".into()),
             data_dir: None,
             token_file: Some("/home/ada/client.token".into()),

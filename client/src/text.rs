@@ -382,6 +382,35 @@ pub fn cut(text: &str, width: usize) -> String {
     truncate_str(text, width, "…").into_owned()
 }
 
+/// A text whose commands of `swarmctl` have an option that names their place, unless they name one.
+/// Commands are in backticks, or they are the rest of a line after a colon, separated by semicolons.
+pub fn in_place(text: &str, option: &str) -> String {
+    let with_option = |command: &str| match command {
+        _ if ["--data-dir", "--coordinator"].iter().any(|named| command.contains(named)) => {
+            command.to_owned()
+        }
+        _ => format!("{command} {option}"),
+    };
+    let line = |line: &str| {
+        let mut parts: Vec<String> = line.split('`').map(str::to_owned).collect();
+        let n_quoted = parts.len() / 2;
+        for quoted in parts.iter_mut().skip(1).step_by(2).take(n_quoted) {
+            if quoted.starts_with("swarmctl ") {
+                *quoted = with_option(quoted);
+            }
+        }
+        if let Some(last) = parts.last_mut()
+            && let Some((before, commands)) = last.split_once(": swarmctl ")
+        {
+            let commands = commands.split("; swarmctl ").map(with_option);
+            *last =
+                format!("{before}: swarmctl {}", commands.collect::<Vec<_>>().join("; swarmctl "));
+        }
+        parts.join("`")
+    };
+    text.split('\n').map(line).collect::<Vec<_>>().join("\n")
+}
+
 /// A command line that a shell reads back to the same arguments.
 pub fn shell_command(args: impl IntoIterator<Item = String>) -> String {
     let quoted: Vec<String> = args

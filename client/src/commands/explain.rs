@@ -91,9 +91,7 @@ async fn explain(
         }
         _ => finding::findings(&experiment, &answer, connection.address()),
     };
-    if let Some(data_dir) = connection.named_place() {
-        findings.iter_mut().for_each(|finding| finding.name_place(&data_dir));
-    }
+    findings.iter_mut().for_each(|finding| finding.name_place(connection));
     Ok((answer, findings))
 }
 

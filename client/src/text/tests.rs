@@ -34,6 +34,28 @@ fn experiment(state: ExperimentState) -> Experiment {
 }
 
 #[test]
+fn commands_in_a_text_get_the_option_that_names_their_place() {
+    let at = |text| in_place(text, "--data-dir d");
+    assert_eq!(
+        at("it is paused; continue it with: swarmctl resume 3"),
+        "it is paused; continue it with: swarmctl resume 3 --data-dir d"
+    );
+    assert_eq!(
+        at("`swarmctl list` shows all: `swarmctl watch 3` ends\nask: swarmctl explain 3"),
+        "`swarmctl list --data-dir d` shows all: `swarmctl watch 3 --data-dir d` ends\n\
+         ask: swarmctl explain 3 --data-dir d"
+    );
+    assert_eq!(
+        at("delete those first: swarmctl delete 4; swarmctl delete 3"),
+        "delete those first: swarmctl delete 4 --data-dir d; swarmctl delete 3 --data-dir d"
+    );
+    for text in ["`run` has none", "see: swarmctl list --coordinator h", "no `swarmctl", "swarmctl"]
+    {
+        assert_eq!(at(text), text);
+    }
+}
+
+#[test]
 fn large_numbers_have_three_digits_and_a_unit() {
     let texts = [0.0, 999.0, 57_600.0, 1.5e9].map(large_number);
     assert_eq!(texts, ["0", "999", "57.60 thousand", "1.50 billion"]);

@@ -70,10 +70,8 @@ impl Reader<'_> {
                         return true;
                     }
                     found = stall(&explanation, self.connection.address());
-                    if let (Some(finding), Some(data_dir)) =
-                        (&mut found, self.connection.named_place())
-                    {
-                        finding.name_place(&data_dir);
+                    if let Some(finding) = &mut found {
+                        finding.name_place(&self.connection);
                     }
                 }
                 Ok(_) => return false,
