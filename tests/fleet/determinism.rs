@@ -106,6 +106,24 @@ fn more_generations_continue_a_completed_run_to_the_same_bits() {
 }
 
 #[test]
+fn more_generations_leave_the_runs_of_a_group_as_they_are() {
+    let experiment = Experiment::small(4);
+    let path = experiment.path();
+    let directory = tempfile::tempdir().unwrap();
+    let at = ["--data-dir", directory.path().to_str().unwrap()];
+    let run = |more: &[&str]| {
+        let args = ["run", path.to_str().unwrap()].into_iter().chain(at);
+        swarmctl(args.chain(more.iter().copied())).expect_success().json_lines()
+    };
+    let of_group = run(&["--generations", "2", "--group", "study"]);
+    let longer = run(&["--generations", "4"]);
+    let id = |lines: &[Value]| lines.last().unwrap()["experiment"].clone();
+    assert_ne!(id(&of_group), id(&longer));
+    let group = swarmctl(["list", "study"].into_iter().chain(at)).expect_success().json_lines();
+    assert_eq!((group.len(), &group[0]["generations"]), (1, &Value::from(2)));
+}
+
+#[test]
 fn another_seed_gives_other_bits() {
     let experiment = Experiment::small(1);
     let as_configured = run_embedded(&experiment, 2, &[]);

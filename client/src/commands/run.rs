@@ -11,6 +11,7 @@ use std::{
 
 use clap::Args;
 use evolution::Digest;
+use model::wire::has_ended;
 use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest, ListWorkersRequest};
 use swarm_telemetry::escape;
 use tokio::time::timeout;
@@ -41,7 +42,8 @@ const ANSWER_TIME: Duration = Duration::from_millis(300);
 /// Starts a coordinator and workers in this process, with the same code as on a fleet,
 /// and follows the experiment to its end. An interrupt loses at most one generation: the
 /// same command continues the experiment. If the experiment has already completed in the
-/// data directory, the command only shows its result.
+/// data directory, the command only shows its result. With more generations, it goes on
+/// with that experiment, unless that belongs to a group.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct RunArgs {
@@ -223,6 +225,17 @@ fn way_to_coordinator(n_workers: u64, address: &str, experiment: Vec<String>) ->
 fn remarks(submitted: &[Experiment], unfinished: &[Experiment], data_dir: &Path) -> Vec<String> {
     let is_ours = |other: &&Experiment| submitted.iter().any(|ours| ours.id == other.id);
     let (continued, others): (Vec<_>, Vec<_>) = unfinished.iter().partition(is_ours);
+    let is_longer = |ours: &&Experiment| {
+        let is_known = continued.iter().any(|other| other.id == ours.id);
+        !is_known && !has_ended(ours.state()) && ours.generations_done > 0
+    };
+    let longer = submitted.iter().filter(is_longer).map(|this| {
+        format!(
+            "going on with {}, which had completed {}; a run of its own: --new",
+            text::title(this),
+            text::counted(this.generations_done, "generation")
+        )
+    });
     let continuing = continued.iter().map(|this| {
         format!(
             "continuing {}, {} of {} generations done",
@@ -238,7 +251,7 @@ fn remarks(submitted: &[Experiment], unfinished: &[Experiment], data_dir: &Path)
             text::command_in("resume", other.id, data_dir)
         )
     });
-    continuing.chain(company).collect()
+    continuing.chain(longer).chain(company).collect()
 }
 
 fn interrupted(data_dir: &Path) -> Error {
@@ -283,7 +296,16 @@ mod tests {
 
     #[test]
     fn a_new_experiment_alone_needs_no_remark() {
-        assert!(remarks(&[experiment(3, "a")], &[], Path::new("data")).is_empty());
+        let new = Experiment { generations_done: 0, ..experiment(3, "a") };
+        assert!(remarks(&[new], &[], Path::new("data")).is_empty());
+    }
+
+    #[test]
+    fn a_completed_experiment_that_goes_on_is_remarked_on() {
+        let lines = remarks(&[experiment(3, "a")], &[], Path::new("data"));
+        let expected = "going on with experiment 3 (a), which had completed 12 generations; a run \
+                        of its own: --new";
+        assert_eq!(lines, [expected]);
     }
 
     #[test]

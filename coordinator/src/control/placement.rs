@@ -126,8 +126,8 @@ fn differs_in_name_only(config_json: &str, config: &ExperimentConfig) -> bool {
         .is_ok_and(|(other, _)| ExperimentConfig { name: config.name.clone(), ..other } == *config)
 }
 
-/// Looks for an identical experiment that can continue: an unfinished one, or one with fewer
-/// generations.
+/// Looks for an identical experiment that can continue: an unfinished one, or one without a group
+/// and with fewer generations.
 fn resume(
     store: &mut Store,
     new: &NewExperiment,
@@ -142,7 +142,9 @@ fn resume(
         return Ok(Some(Placement::RunsAlready(same.id)));
     }
     for experiment in same_bits {
-        let can_go_on = experiment.can_be_continued()
+        // The runs of a group are compared with each other, so all keep their length.
+        let can_go_on = experiment.membership.is_none()
+            && experiment.can_be_continued()
             && experiment.n_generations() < new.config.algorithm.generations
             && differs_in_generations_only(&experiment.config_json, &new.config);
         if !can_go_on {
