@@ -9,7 +9,7 @@ use experiment_file::limits;
 use replay::{Episode, Judged, Replay, ReplayError, Trials};
 use schemars::JsonSchema;
 use serde::Serialize;
-use sim_core::{RoomRecord, StepRecord, TrialSet};
+use sim_core::{RobotRecord, RoomRecord, StepRecord, TrialSet};
 use swarm_proto::v1::JudgedFitness;
 use swarm_web::replay_file;
 
@@ -123,8 +123,11 @@ pub async fn replay(
             let all = all.map_err(|error| Error::Input(format!("{name}: {error}")).about(&name))?;
             let all = all.expect("nothing stops it");
             let (trial, what) = judged_trial(&all, judged.trials, args.judged)?;
-            progress.remark(&what);
             // A changed swarm has no judgement.
+            progress.remark(match is_as_evolved {
+                true => &what,
+                false => "playing a world of the judgement, changed",
+            });
             trials = is_as_evolved.then_some(all);
             Episode { trial_set: TrialSet::Judgement(judged.generation), trial, ..episode }
         }
@@ -208,14 +211,35 @@ fn room(episode: &Episode<'_>) -> Result<Option<RoomRecord>, Error> {
     room.map_err(|error| Error::Input(error.to_string()).about(name))
 }
 
-/// All steps of an episode.
+/// All steps of an episode, without the networks, which a picture does not show.
 fn steps(episode: &Episode<'_>) -> Result<Vec<StepRecord>, Error> {
     let mut steps = Vec::new();
     let Episode { simulation, genotype, trial_set, trial, name, .. } = *episode;
     simulation
-        .simulate(genotype, trial_set, trial, &mut |step| steps.push(step.clone()))
+        .simulate(genotype, trial_set, trial, &mut |step| steps.push(outside(step)))
         .map_err(|error| Error::Input(format!("{name}: {error}")).about(name))?;
     Ok(steps)
+}
+
+/// A step without the inputs and neurons of the robots.
+fn outside(step: &StepRecord) -> StepRecord {
+    let outside = |robot: &RobotRecord| RobotRecord {
+        received: robot.received.clone(),
+        message: robot.message.clone(),
+        stimuli: Vec::new(),
+        activity: Vec::new(),
+        voltages: Vec::new(),
+        received_message: Vec::new(),
+        ..*robot
+    };
+    StepRecord {
+        robots: step.robots.iter().map(outside).collect(),
+        measures: step.measures.clone(),
+        lights: step.lights.clone(),
+        areas: step.areas.clone(),
+        movables: step.movables.clone(),
+        ..*step
+    }
 }
 
 impl ReplayArgs {
