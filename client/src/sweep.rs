@@ -64,6 +64,9 @@ impl FromStr for Seeds {
                 return Err(format!("`{part}` has more than {RUNS_MAX} seeds"));
             }
             seeds.extend(first..=last);
+            if seeds.len() > RUNS_MAX {
+                return Err(format!("more than {RUNS_MAX} seeds"));
+            }
         }
         Ok(Self(seeds.into_iter().collect()))
     }

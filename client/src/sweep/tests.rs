@@ -41,6 +41,8 @@ fn seeds_are_listed_or_spanned_with_both_ends() {
     for text in ["", "a", "1..", "4..2", "1,,2", "-1", "0..18446744073709551615", "0..1000"] {
         seeds(text).unwrap_err();
     }
+    assert_eq!(seeds("0..499,250..999").unwrap().len(), 1000);
+    assert_eq!(seeds("0..499,500..999,1000").unwrap_err(), "more than 1000 seeds");
 }
 
 #[test]
