@@ -10,7 +10,7 @@ use std::{
 use tracing::{Event, Level, Subscriber, warn};
 use tracing_subscriber::{
     EnvFilter, Layer,
-    filter::ParseError,
+    filter::{LevelFilter, ParseError},
     fmt,
     layer::{Context, SubscriberExt as _},
     util::SubscriberInitExt as _,
@@ -42,18 +42,27 @@ enum LogFormat {
 
 /// The value of `--log-level` is not valid.
 #[derive(Debug, thiserror::Error)]
-#[error("--log-level {level}: {source}")]
-pub struct LogError {
-    level: String,
-    source: ParseError,
+pub enum LogError {
+    /// It is no list of levels.
+    #[error("--log-level {level}: {source}")]
+    Unreadable {
+        /// The value.
+        level: String,
+        /// The mistake.
+        source: ParseError,
+    },
+    /// A word in it is no level. A filter would take it for a module, and log nothing else.
+    #[error(
+        "--log-level {0}: give error, warn, info, debug, trace or off; MODULE=LEVEL is for one \
+         module"
+    )]
+    NoLevel(String),
 }
 
 impl LogArgs {
     /// Starts logging.
     pub fn init(&self) -> Result<(), LogError> {
-        let level = &self.log_level;
-        let filter = EnvFilter::try_new(level)
-            .map_err(|source| LogError { level: level.clone(), source })?;
+        let filter = filter(&self.log_level)?;
         let lines = fmt::layer().with_writer(|| EscapingWriter(io::stderr()));
         let lines = match self.log_format {
             LogFormat::Text => {
@@ -64,6 +73,17 @@ impl LogArgs {
         let log = tracing_subscriber::registry().with(filter);
         log.with(LibraryThrottle::default()).with(lines).init();
         Ok(())
+    }
+}
+
+/// The filter of a list of levels.
+fn filter(levels: &str) -> Result<EnvFilter, LogError> {
+    let is_level = |word: &&str| word.contains(['=', '[']) || word.parse::<LevelFilter>().is_ok();
+    let words = || levels.split(',').map(str::trim).filter(|word| !word.is_empty());
+    match words().find(|word| !is_level(word)) {
+        Some(word) => Err(LogError::NoLevel(word.to_owned())),
+        None => EnvFilter::try_new(levels)
+            .map_err(|source| LogError::Unreadable { level: levels.to_owned(), source }),
     }
 }
 
@@ -119,6 +139,19 @@ mod tests {
         fn flush(&mut self) -> io::Result<()> {
             Ok(())
         }
+    }
+
+    #[test]
+    fn a_word_that_is_no_level_is_refused() {
+        for levels in ["info", "WARN", "off", "info,worker=debug", "worker[span]=trace", "info,"] {
+            filter(levels).unwrap();
+        }
+        for (levels, wrong) in [("inof", "inof"), ("info,worker", "worker"), ("warning", "warning")]
+        {
+            let error = filter(levels).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("--log-level {wrong}: give error, ")), "{error}");
+        }
+        assert!(matches!(filter("worker=loud"), Err(LogError::Unreadable { .. })));
     }
 
     #[test]
