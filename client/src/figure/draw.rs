@@ -189,14 +189,19 @@ impl Figure {
     }
 }
 
+/// The greatest magnitude on an axis, so that the length of an axis is a number.
+const MAGNITUDE: f64 = 1e300;
+
 /// From the least to the greatest value; never empty.
 fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let values = values.map(|value| value.clamp(-MAGNITUDE, MAGNITUDE));
     let bounds = values.fold(None, |bounds, value| match bounds {
         None => Some((value, value)),
         Some((min, max)) => Some((f64::min(min, value), f64::max(max, value))),
     });
     let (min, max) = bounds.unwrap_or((0.0, 1.0));
-    if min < max { min..max } else { min - 0.5..max + 0.5 }
+    let room = f64::max(0.5, 1e-3 * min.abs());
+    if min < max { min..max } else { min - room..max + room }
 }
 
 /// About the distance of two ticks.

@@ -48,6 +48,15 @@ fn decoded(bytes: &[u8]) -> (u32, u32, Vec<[u8; 3]>) {
 }
 
 #[test]
+fn axes_have_a_length_whatever_the_values() {
+    for (low, high) in [(-f64::MAX, f64::MAX), (f64::MAX, f64::MAX), (1e20, 1e20), (0.0, 0.0)] {
+        let points = [(0.0, low, low, high), (1.0, low, high, high)];
+        let svg = figure(vec![curve("GA", &points)]).to_svg().unwrap();
+        assert!(svg.ends_with("</svg>\n"), "{low} to {high}");
+    }
+}
+
+#[test]
 fn an_svg_has_a_band_a_line_and_a_name_per_curve() {
     insta::assert_snapshot!(two_runs().to_svg().unwrap());
 }
