@@ -2,6 +2,7 @@
 //! will take here and on larger fleets.
 
 use std::{
+    iter::Sum,
     path::{Path, PathBuf},
     thread,
     time::{Duration, Instant},
@@ -12,7 +13,7 @@ use determinism::random::{Purpose, Stream};
 use experiment_file::ExperimentConfig;
 use schemars::JsonSchema;
 use serde::Serialize;
-use sim_core::{Isa, Simulation};
+use sim_core::{EvaluateError, Isa, Simulation};
 
 use crate::{
     args::{IsaArgs, cores, whole},
@@ -73,9 +74,10 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
                 (0..n_cores as u64).map(|core| scope.spawn(simulate(core))).collect();
             let speeds =
                 cores.into_iter().map(|core| core.join().expect("simulation does not panic"));
-            speeds.fold(Speed::default(), Speed::and)
+            speeds.sum::<Result<Speed, EvaluateError>>()
         })
     });
+    let speed = speed.map_err(|error| Error::Input(format!("{}: {error}", config.name)))?;
     let report = Report::new(&config, isa, n_cores, &speed);
     match progress.is_json() {
         true => progress.print_document(&report),
@@ -105,23 +107,43 @@ struct Speed {
 }
 
 impl Speed {
-    /// Evaluates one genotype after the other, for `duration` at least.
-    fn of_core(experiment: &Simulation, n_trials: u32, core: u64, duration: Duration) -> Self {
+    /// Evaluates one genotype after the other, for `duration` at least. An error if none can be
+    /// evaluated.
+    fn of_core(
+        experiment: &Simulation,
+        n_trials: u32,
+        core: u64,
+        duration: Duration,
+    ) -> Result<Self, EvaluateError> {
         let mut genes = Stream::new(0, 0, 0, Purpose::Evolution, core);
         let start: Instant = clock::now();
-        let mut n_genotypes = 0;
+        let (mut n_genotypes, mut n_failed) = (0, 0);
+        let mut failure = None;
         while start.elapsed() < duration {
             let genotype: Vec<f64> =
                 (0..experiment.genotype_len()).map(|_| genes.uniform()).collect();
             // A world that cannot be set up takes a negligible time.
-            let _ = experiment.evaluate(&genotype, n_genotypes, 0..n_trials);
-            n_genotypes += 1;
+            match experiment.evaluate(&genotype, n_genotypes + n_failed, 0..n_trials) {
+                Ok(_) => n_genotypes += 1,
+                Err(error) => {
+                    n_failed += 1;
+                    failure = Some(error);
+                }
+            }
         }
-        Self { n_genotypes, time: start.elapsed() }
+        match failure {
+            Some(error) if n_genotypes == 0 => Err(error),
+            _ => Ok(Self { n_genotypes, time: start.elapsed() }),
+        }
     }
+}
 
-    fn and(self, other: Self) -> Self {
-        Self { n_genotypes: self.n_genotypes + other.n_genotypes, time: self.time + other.time }
+impl Sum for Speed {
+    fn sum<I: Iterator<Item = Self>>(speeds: I) -> Self {
+        speeds.fold(Self::default(), |sum, speed| Self {
+            n_genotypes: sum.n_genotypes + speed.n_genotypes,
+            time: sum.time + speed.time,
+        })
     }
 }
 
@@ -200,6 +222,8 @@ impl<'a> Report<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
@@ -217,9 +241,22 @@ mod tests {
     }
 
     #[test]
+    fn an_experiment_that_cannot_be_simulated_has_no_speed() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("aggregation.json");
+        fs::write(&path, include_str!("../../../configs/tasks/aggregation.json")).unwrap();
+        let script = include_str!("../../../configs/tasks/aggregation.star");
+        let script = script.replace("def fitness(world):", "def fitness(world):\n    fail(\"no\")");
+        fs::write(dir.path().join("aggregation.star"), script).unwrap();
+        let (_, experiment) = experiment(Some(&path)).unwrap();
+        let speed = Speed::of_core(&experiment, 1, 0, Duration::from_millis(1));
+        assert!(speed.unwrap_err().to_string().contains("no"));
+    }
+
+    #[test]
     fn a_core_simulates_until_its_time_is_over() {
         let (_, experiment) = experiment(None).unwrap();
-        let speed = Speed::of_core(&experiment, 1, 0, Duration::from_millis(1));
+        let speed = Speed::of_core(&experiment, 1, 0, Duration::from_millis(1)).unwrap();
         assert!(speed.n_genotypes >= 1 && speed.time >= Duration::from_millis(1));
     }
 }
