@@ -113,7 +113,7 @@ impl Run {
                     plain(&error)
                 ))
             })?;
-        if !generations.is_sorted_by_key(|generation| generation.generation) {
+        if !generations.is_sorted_by(|a, b| a.generation < b.generation) {
             return Err(problem("the generations must be those of one run, in order".into()));
         }
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -136,7 +136,12 @@ impl Samples {
             }
             let history = Run::fetch(connection, experiment.clone()).await?.points;
             let run = self.run(&name, experiment.seed);
-            run.sources.push(format!("experiment {}", experiment.id));
+            let source = format!("experiment {}", experiment.id);
+            if run.sources.contains(&source) {
+                self.problems.push(format!("{source} is named twice"));
+                continue;
+            }
+            run.sources.push(source);
             if run.history.is_some() {
                 let problem = format!(
                     "{name}, seed {}: {}; name the runs to compare by their numbers, or delete one of \
@@ -158,6 +163,11 @@ impl Samples {
     pub fn finish(self) -> Result<Vec<Sample>, Error> {
         if self.samples.is_empty() {
             return Err(Error::WrongState("no run has completed yet".into()));
+        }
+        let mut runs = self.samples.iter().flat_map(|sample| sample.runs.values());
+        if runs.all(|run| run.judged.is_none() && run.history.is_none()) {
+            let why = "no champion has been judged, and no run has a history";
+            return Err(Error::WrongState(why.into()));
         }
         Ok(self.samples)
     }

@@ -220,9 +220,24 @@ async fn a_group_is_compared_by_its_variants_and_unfinished_runs_are_left_out() 
     assert_eq!(report["quantities"][0]["samples"][0]["values"][0], 1.25);
     assert_eq!(report["quantities"][1]["samples"][0]["values"][0], 1.5);
 
+    let twice = ["sizes", "sizes"].map(str::to_owned);
+    let error = run(connection.address(), &twice, None, OutputFormat::Json).await.unwrap_err();
+    assert!(error.to_string().ends_with("is named twice"), "{error}");
+
     fake.script(|script| script.experiment.set_state(ExperimentState::Running));
     let error = run(connection.address(), &group, None, OutputFormat::Json).await.unwrap_err();
     assert_eq!((error.exit_code(), error.to_string().as_str()), (3, "no run has completed yet"));
+}
+
+#[test]
+fn champions_that_nobody_has_judged_have_nothing_to_compare() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a-1.json");
+    fs::write(&path, r#"{"name": "a", "seed": 1, "genotype": [1]}"#).unwrap();
+    let mut samples = Samples::default();
+    samples.read(&[path]).unwrap();
+    let error = samples.finish().unwrap_err().to_string();
+    assert_eq!(error, "no champion has been judged, and no run has a history");
 }
 
 #[tokio::test]

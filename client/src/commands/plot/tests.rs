@@ -110,6 +110,7 @@ async fn a_file_without_a_history_is_refused_in_one_line() {
         ("generation,best,mean,min\n0,1,2,x\n", "line 2"),
         ("generation,best,mean,min\n0,1,2\n", "history ID --output csv"),
         ("generation,best,mean,min\n1,1,1,1\n0,1,1,1\n", "in order"),
+        ("generation,best,mean,min\n0,1,1,1\n0,1,1,1\n", "those of one run"),
         ("\u{0}\u{1}", "no generation"),
     ] {
         let file = csv(&dir, "a.csv", text);
