@@ -92,7 +92,9 @@ async fn export(
         }
         (None, Some(directory)) => {
             let (path, bytes) = events(connection, id, directory).await?;
-            (path, bytes, format!("open it with: tensorboard --logdir {}", directory.display()))
+            let words = ["tensorboard", "--logdir", &directory.to_string_lossy()];
+            let next = format!("open it with: {}", text::shell_command(words.map(str::to_owned)));
+            (path, bytes, next)
         }
         (None, None) => return Err(Error::Input("name a file to write with --to".into())),
     };

@@ -8,9 +8,10 @@ mod trace;
 use std::{borrow::Cow, path::Path};
 
 use experiment_file::Seed;
+use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Serialize;
-use sim_core::{EpisodeSummary, EvaluateError, MeasureName, Measures};
+use sim_core::{EpisodeSummary, EvaluateError, MeasureName};
 
 use crate::{
     connection::Connection,
@@ -188,22 +189,15 @@ impl SimulationReport<'_> {
 
 /// Means over the trials; for a measure, over the trials that have it.
 fn mean(trials: &[Trial]) -> EpisodeSummary {
-    let mean = |values: &mut dyn Iterator<Item = f64>| {
-        let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
-        sum / n
-    };
-    let measures = || trials.iter().flat_map(|trial| &trial.summary.measures);
-    let names: Vec<MeasureName> = measures().map(|(name, _)| name.clone()).collect();
-    let means: Measures = names
-        .into_iter()
-        .map(|name| {
-            let mean = mean(&mut measures().filter(|m| *m.0 == name).map(|m| *m.1));
-            (name, mean)
-        })
-        .collect();
+    let mut sums: IndexMap<&MeasureName, (f64, f64)> = IndexMap::new();
+    for (name, value) in trials.iter().flat_map(|trial| &trial.summary.measures) {
+        let (sum, n) = sums.entry(name).or_insert((0.0, 0.0));
+        (*sum, *n) = (*sum + value, *n + 1.0);
+    }
+    let fitness: f64 = trials.iter().map(|trial| trial.summary.fitness).sum();
     EpisodeSummary {
-        fitness: mean(&mut trials.iter().map(|trial| trial.summary.fitness)),
-        measures: means,
+        fitness: fitness / trials.len() as f64,
+        measures: sums.into_iter().map(|(name, (sum, n))| (name.clone(), sum / n)).collect(),
     }
 }
 
