@@ -119,8 +119,10 @@ fn more_generations_leave_the_runs_of_a_group_as_they_are() {
     let longer = run(&["--generations", "4"]);
     let id = |lines: &[Value]| lines.last().unwrap()["experiment"].clone();
     assert_ne!(id(&of_group), id(&longer));
-    let group = swarmctl(["list", "study"].into_iter().chain(at)).expect_success().json_lines();
-    assert_eq!((group.len(), &group[0]["generations"]), (1, &Value::from(2)));
+    let group = swarmctl(["list", "study"].into_iter().chain(at)).expect_success().json();
+    let lengths: Vec<&Value> =
+        group.as_array().unwrap().iter().map(|run| &run["generations"]).collect();
+    assert_eq!(lengths, [&Value::from(2)]);
 }
 
 #[test]

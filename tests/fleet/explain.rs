@@ -362,9 +362,9 @@ async fn an_experiment_that_is_queued_beside_another_is_alone_once_that_is_pause
     busy.receive_assignments().await.unwrap();
     let queued = wait_for_finding(&coordinator, id, "queued", &format!(": {rival}"));
     let raise = step(&queued, 0);
-    carry_out(&coordinator, &format!("{}200", raise.strip_suffix('N').unwrap()));
+    carry_out(&coordinator, &raise.replace(" N ", " 200 "));
     let pause = step(&queued, 1);
-    carry_out(&coordinator, &format!("{}{rival}", pause.strip_suffix("ID").unwrap()));
+    carry_out(&coordinator, &pause.replace(" ID ", &format!(" {rival} ")));
     wait_for_end_of_finding(&coordinator, id, "queued");
     busy.hang_up().await;
     let _worker = WorkerProcess::start(&coordinator, "worker");
