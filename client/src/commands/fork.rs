@@ -112,11 +112,21 @@ impl ForkArgs {
     fn changed(&self, config_json: &str) -> Result<ExperimentFile, Error> {
         let mut file = Json::parse(config_json);
         let mut changes = Vec::new();
-        let mut problems = Vec::new();
+        let mut problems: Vec<String> = Vec::new();
         for text in &self.set.set {
             match Change::parse_all(text) {
                 Ok(parsed) => changes.extend(parsed),
                 Err(problem) => problems.push(format!("--set {problem}")),
+            }
+        }
+        let options = [
+            ("seed", "--seed", self.seed.seed.is_some()),
+            ("name", "--name", self.name.is_some()),
+            ("algorithm.generations", "--generations", self.generations.is_some()),
+        ];
+        for (path, option, is_given) in options {
+            if is_given && changes.iter().any(|change: &Change| change.path == path) {
+                problems.push(format!("--set {path}: {option} also sets it; give one of them"));
             }
         }
         if let Some(name) = &self.name {

@@ -178,6 +178,10 @@ impl Remote for LabelArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let set: std::collections::BTreeMap<String, String> =
             self.labels.into_iter().map(|Label { key, value }| (key, value)).collect();
+        if let Some(key) = self.remove.iter().find(|key| set.contains_key(*key)) {
+            let problem = format!("{key}: it is also to be set; give one of them");
+            return Err(Error::option("--remove", problem));
+        }
         let label = async |experiment_id| {
             let (set, remove) = (set.clone(), self.remove.clone());
             let request = LabelExperimentRequest { experiment_id, set, remove };
@@ -227,6 +231,26 @@ mod tests {
     use crate::{experiment_file::tests::quickstart, place::Place};
 
     #[tokio::test(flavor = "multi_thread")]
+    async fn contradictions_are_refused_and_archived_runs_are_counted() {
+        let temporary = tempfile::tempdir().unwrap();
+        let path = temporary.path().join("data");
+        let at = ["--data-dir", path.to_str().unwrap()];
+        let file = quickstart().display().to_string();
+        output(&format!("run {file} --generations 1 --group both"), &at).await;
+        let refused = output("label 1 a=b --remove a", &at).await;
+        assert!(
+            refused.ends_with("--remove a: it is also to be set; give one of them"),
+            "{refused}"
+        );
+        let refused = output("fork 1@0 --seed 5 --set seed=6", &at).await;
+        let expected = "--set seed: --seed also sets it; give one of them";
+        assert!(refused.ends_with(expected), "{refused}");
+        output("archive both", &at).await;
+        let none = "no such experiments but 1 archived: --all lists them";
+        assert_eq!(output("list both", &at).await, none);
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
     async fn forks_are_deleted_before_their_parents() {
         let temporary = tempfile::tempdir().unwrap();
         let path = temporary.path().join("data");
@@ -247,6 +271,8 @@ mod tests {
         output("resume 2", &at).await;
         let refused = output("delete 1 --yes", &at).await;
         assert!(refused.contains("[exit code"), "{refused}");
+        let next = format!("delete that first: swarmctl delete 2 --data-dir {}", path.display());
+        assert!(refused.ends_with(&next), "{refused}");
         let deleted = output("delete both --yes", &at).await;
         assert!(!deleted.contains("[exit code"), "{deleted}");
         assert_eq!(deleted.matches("deleted, ").count(), 2, "{deleted}");

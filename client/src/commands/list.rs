@@ -91,7 +91,15 @@ impl Remote for ListArgs {
         self.filter.sort(&mut experiments);
         let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
         let table = table(&experiments, clock::unix_ms());
-        progress.print_table(&table, &CSV_KEYS, &documents, "no such experiments")?;
+        let n_archived = match experiments.is_empty() {
+            true => connection.list(self.filter.with_archived(self.group.clone())).await?.len(),
+            false => 0,
+        };
+        let none = match n_archived {
+            0 => "no such experiments".to_owned(),
+            n => format!("no such experiments but {n} archived: --all lists them"),
+        };
+        progress.print_table(&table, &CSV_KEYS, &documents, &none)?;
         let request = ListWorkersRequest {};
         let answer = connection.call_fleet(async |client| client.list_workers(request).await);
         let n_evaluations = answer.await.map_or(0, |answer| answer.evaluations.len());
@@ -121,17 +129,17 @@ fn table(experiments: &[Experiment], now_ms: u64) -> Table {
         Column::number("eta").dropped(2),
         Column::number("selection").dropped(3),
         Column::number("judged").dropped(1),
-        Column::number("seed").dropped(4),
-        Column::new("algorithm").dropped(6),
-        Column::number("age").dropped(5),
+        Column::number("seed").dropped(5),
+        Column::new("algorithm").dropped(7),
+        Column::number("age").dropped(6),
         Column::number("best").wide(),
         Column::number("mean").wide(),
         Column::number("priority").wide(),
         Column::number("population").wide(),
         Column::number("genes").wide(),
         Column::new("submitted").wide(),
-        shown_if(has_groups, Column::new("group").dropped(7)),
-        shown_if(has_variants, Column::name("variant").dropped(8)),
+        shown_if(has_groups, Column::new("group").dropped(8)),
+        shown_if(has_variants, Column::name("variant").dropped(4)),
         shown_if(has_labels, Column::text("labels").dropped(9)),
         Column::new("archived").wide(),
         Column::new("forked from").wide(),

@@ -73,6 +73,11 @@ impl Filter {
         }
     }
 
+    /// The same with archived experiments.
+    pub fn with_archived(&self, named: Option<String>) -> ListExperimentsRequest {
+        ListExperimentsRequest { without_archived: false, ..self.wanted(named) }
+    }
+
     /// Sorts experiments, which arrive in the order of their numbers.
     pub fn sort(&self, experiments: &mut [Experiment]) {
         experiments.sort_by(|a, b| self.sort.compare(a, b));
