@@ -224,7 +224,6 @@ fn steps(episode: &Episode<'_>) -> Result<Vec<StepRecord>, Error> {
 /// A step without the inputs and neurons of the robots.
 fn outside(step: &StepRecord) -> StepRecord {
     let outside = |robot: &RobotRecord| RobotRecord {
-        received: robot.received.clone(),
         message: robot.message.clone(),
         stimuli: Vec::new(),
         activity: Vec::new(),

@@ -71,7 +71,7 @@ impl Reader<'_> {
                     }
                     found = stall(&explanation, self.connection.address());
                     if let Some(finding) = &mut found {
-                        finding.name_place(&self.connection);
+                        finding.name_place(self.connection);
                     }
                 }
                 Ok(_) => return false,
