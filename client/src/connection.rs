@@ -97,14 +97,9 @@ impl Connection {
     /// A connection to a place: to a coordinator, or to the services on a data directory in this
     /// process.
     pub async fn to(place: Place, intent: Intent) -> Result<Self, Error> {
-        let path = match place {
-            Place::Coordinator(settings) => {
-                let connection = Self::new(settings.address(), &settings.credentials()?)?;
-                let said = settings.is_coordinator_said.then_some("--coordinator");
-                let place = said.map(|option| [option, settings.address()].map(str::to_owned));
-                return Ok(Self { place, ..connection });
-            }
-            Place::Directory { path, .. } => path,
+        let (path, is_found) = match place {
+            Place::Coordinator(settings) => return Self::at(&settings),
+            Place::Directory { path, is_found } => (path, is_found),
         };
         let data_dir = &*path;
         intent.check(data_dir)?;
@@ -113,13 +108,25 @@ impl Connection {
             _ => InProcess::write(data_dir).await,
         };
         let services = services.map_err(services::refused)?;
-        Ok(Self::here(data_dir, services.door().clone(), Some(services)))
+        let this = Self::here(data_dir, services.door().clone(), Some(services));
+        Ok(if is_found { Self { place: None, ..this } } else { this })
+    }
+
+    /// A connection to the coordinator of the settings.
+    pub fn at(settings: &Settings) -> Result<Self, Error> {
+        let connection = Self::new(settings.address(), &settings.credentials()?)?;
+        let said = settings.is_coordinator_said.then_some("--coordinator");
+        let place = said.map(|option| [option, settings.address()].map(str::to_owned));
+        Ok(Self { place, ..connection })
     }
 
     /// A connection to the coordinator in this process that computes a data directory.
     #[cfg(feature = "local")]
     pub fn computing(data_dir: &Path, door: Door) -> Self {
-        Self::here(data_dir, door, None)
+        match Self::here(data_dir, door, None) {
+            this if data_dir == Path::new(DEFAULT_DATA_DIR) => Self { place: None, ..this },
+            this => this,
+        }
     }
 
     fn here(data_dir: &Path, door: Door, services: Option<InProcess>) -> Self {
@@ -127,8 +134,7 @@ impl Connection {
         let here = Here { data_dir: data_dir.into(), door, services, set_going: Mutex::default() };
         let address = data_dir.display().to_string();
         // A failure in this process is not transient.
-        let is_default = data_dir == Path::new(DEFAULT_DATA_DIR);
-        let place = (!is_default).then(|| ["--data-dir".to_owned(), address.clone()]);
+        let place = Some(["--data-dir".to_owned(), address.clone()]);
         let this = Self::on(address, Way::Here(Arc::new(here)), &channel);
         Self { place, ..this }.with_patience(Duration::ZERO)
     }

@@ -54,8 +54,7 @@ impl Resimulation {
     ) -> Result<Self, Error> {
         if settings.data_dir.is_none() && settings.has_coordinator() {
             let settings = settings.or_file()?;
-            let connection =
-                Box::new(Connection::new(settings.address(), &settings.credentials()?)?);
+            let connection = Box::new(Connection::at(&settings)?);
             return Ok(Self::Fleet { connection, config_json: config_json.to_owned() });
         }
         let n_threads = n_threads.map_or_else(cores, usize::from);

@@ -61,8 +61,8 @@ pub struct Settings {
     pub token_file: Option<PathBuf>,
     #[command(flatten)]
     pub credentials: CredentialArgs,
-    /// Whether only the command line names the coordinator, so that a further command would not
-    /// find it by itself.
+    /// Whether the command line names the coordinator, and the environment does not: a further
+    /// command would perhaps not find it by itself.
     #[arg(skip)]
     pub is_coordinator_said: bool,
 }

@@ -393,7 +393,8 @@ pub fn in_place(text: &str, option: &str) -> String {
     };
     let line = |line: &str| {
         let mut parts: Vec<String> = line.split('`').map(str::to_owned).collect();
-        let n_quoted = parts.len() / 2;
+        // A backtick that nothing closes quotes nothing.
+        let n_quoted = (parts.len() - 1) / 2;
         for quoted in parts.iter_mut().skip(1).step_by(2).take(n_quoted) {
             if quoted.starts_with("swarmctl ") {
                 *quoted = with_option(quoted);

@@ -64,7 +64,7 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
     let n_trials = config.algorithm.num_evaluations;
     let what =
         format!("simulating on {n_cores} cores for {} s; --seconds shortens this", args.seconds);
-    let speed = waiting::busy(&what, || {
+    let (speed, failure) = waiting::busy(&what, || {
         thread::scope(|scope| {
             let simulate = |core| {
                 let experiment = &experiment;
@@ -74,10 +74,13 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
                 (0..n_cores as u64).map(|core| scope.spawn(simulate(core))).collect();
             let speeds =
                 cores.into_iter().map(|core| core.join().expect("simulation does not panic"));
-            speeds.sum::<Result<Speed, EvaluateError>>()
+            let (speeds, failures): (Vec<Speed>, Vec<_>) = speeds.unzip();
+            (speeds.into_iter().sum::<Speed>(), failures.into_iter().flatten().next())
         })
     });
-    let speed = speed.map_err(|error| Error::Input(format!("{}: {error}", config.name)))?;
+    if let (0, Some(error)) = (speed.n_genotypes, failure) {
+        return Err(Error::Input(format!("{}: {error}", config.name)));
+    }
     let report = Report::new(&config, isa, n_cores, &speed);
     match progress.is_json() {
         true => progress.print_document(&report),
@@ -107,14 +110,14 @@ struct Speed {
 }
 
 impl Speed {
-    /// Evaluates one genotype after the other, for `duration` at least. An error if none can be
-    /// evaluated.
+    /// Evaluates one genotype after the other, for `duration` at least. Also returns the last
+    /// failure; its time counts.
     fn of_core(
         experiment: &Simulation,
         n_trials: u32,
         core: u64,
         duration: Duration,
-    ) -> Result<Self, EvaluateError> {
+    ) -> (Self, Option<EvaluateError>) {
         let mut genes = Stream::new(0, 0, 0, Purpose::Evolution, core);
         let start: Instant = clock::now();
         let (mut n_genotypes, mut n_failed) = (0, 0);
@@ -122,7 +125,6 @@ impl Speed {
         while start.elapsed() < duration {
             let genotype: Vec<f64> =
                 (0..experiment.genotype_len()).map(|_| genes.uniform()).collect();
-            // A world that cannot be set up takes a negligible time.
             match experiment.evaluate(&genotype, n_genotypes + n_failed, 0..n_trials) {
                 Ok(_) => n_genotypes += 1,
                 Err(error) => {
@@ -131,10 +133,7 @@ impl Speed {
                 }
             }
         }
-        match failure {
-            Some(error) if n_genotypes == 0 => Err(error),
-            _ => Ok(Self { n_genotypes, time: start.elapsed() }),
-        }
+        (Self { n_genotypes, time: start.elapsed() }, failure)
     }
 }
 
@@ -249,14 +248,15 @@ mod tests {
         let script = script.replace("def fitness(world):", "def fitness(world):\n    fail(\"no\")");
         fs::write(dir.path().join("aggregation.star"), script).unwrap();
         let (_, experiment) = experiment(Some(&path)).unwrap();
-        let speed = Speed::of_core(&experiment, 1, 0, Duration::from_millis(1));
-        assert!(speed.unwrap_err().to_string().contains("no"));
+        let (speed, failure) = Speed::of_core(&experiment, 1, 0, Duration::from_millis(1));
+        assert_eq!(speed.n_genotypes, 0);
+        assert!(failure.unwrap().to_string().contains("no"));
     }
 
     #[test]
     fn a_core_simulates_until_its_time_is_over() {
         let (_, experiment) = experiment(None).unwrap();
-        let speed = Speed::of_core(&experiment, 1, 0, Duration::from_millis(1)).unwrap();
+        let speed = Speed::of_core(&experiment, 1, 0, Duration::from_millis(1)).0;
         assert!(speed.n_genotypes >= 1 && speed.time >= Duration::from_millis(1));
     }
 }

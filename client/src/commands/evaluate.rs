@@ -124,7 +124,7 @@ async fn remote(
         }
         Place::Coordinator(settings) => {
             progress.expiring(&settings);
-            let connection = Connection::new(settings.address(), &settings.credentials()?)?;
+            let connection = Connection::at(&settings)?;
             Ok(Some(connection.with_patience(PATIENCE_WHILE_FOLLOWING)))
         }
     }

@@ -91,7 +91,7 @@ impl Remote for ListArgs {
         self.filter.sort(&mut experiments);
         let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
         let table = table(&experiments, clock::unix_ms());
-        let n_archived = match experiments.is_empty() {
+        let n_archived = match experiments.is_empty() && !progress.is_json() {
             true => connection.list(self.filter.with_archived(self.group.clone())).await?.len(),
             false => 0,
         };
@@ -103,7 +103,9 @@ impl Remote for ListArgs {
         let request = ListWorkersRequest {};
         let answer = connection.call_fleet(async |client| client.list_workers(request).await);
         let n_evaluations = answer.await.map_or(0, |answer| answer.evaluations.len());
-        text::evaluations(n_evaluations).iter().for_each(|remark| progress.remark(remark));
+        if let Some(remark) = text::evaluations(n_evaluations) {
+            progress.remark(&connection.in_place(&remark));
+        }
         if let Some(data_dir) = connection.idle_data_dir().await
             && let Some(experiment) =
                 experiments.iter().find(|experiment| !has_ended(experiment.state()))

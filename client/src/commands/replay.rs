@@ -124,9 +124,13 @@ pub async fn replay(
             let all = all.expect("nothing stops it");
             let (trial, what) = judged_trial(&all, judged.trials, args.judged)?;
             // A changed swarm has no judgement.
+            let changed = format!(
+                "playing trial {trial} of the {} of the judgement, with changes; others: --judged N",
+                judged.trials
+            );
             progress.remark(match is_as_evolved {
                 true => &what,
-                false => "playing a world of the judgement, changed",
+                false => &changed,
             });
             trials = is_as_evolved.then_some(all);
             Episode { trial_set: TrialSet::Judgement(judged.generation), trial, ..episode }
@@ -224,7 +228,7 @@ fn steps(episode: &Episode<'_>) -> Result<Vec<StepRecord>, Error> {
 /// A step without the inputs and neurons of the robots.
 fn outside(step: &StepRecord) -> StepRecord {
     let outside = |robot: &RobotRecord| RobotRecord {
-        message: robot.message.clone(),
+        message: Vec::new(),
         stimuli: Vec::new(),
         activity: Vec::new(),
         voltages: Vec::new(),

@@ -11,7 +11,6 @@ use std::{
 
 use clap::Args;
 use evolution::Digest;
-use model::wire::has_ended;
 use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest, ListWorkersRequest};
 use swarm_telemetry::escape;
 use tokio::time::timeout;
@@ -179,9 +178,9 @@ async fn existing(
 
 /// Reports the existing experiment, and the alternatives; `name`: that of the file.
 fn already_completed(existing: &Experiment, name: &str) -> String {
-    let of_group = match &*existing.group {
-        "" => String::new(),
-        group => format!(" of group {group}"),
+    let (of_group, own) = match &*existing.group {
+        "" => (String::new(), ""),
+        group => (format!(" of group {group}"), ", in a run of its own"),
     };
     let once_more = match text::under_another_name(&existing.name, name) {
         Some(old) => format!("{old}; under `{}`: --new", escape(name)),
@@ -189,7 +188,7 @@ fn already_completed(existing: &Experiment, name: &str) -> String {
     };
     format!(
         "{}{of_group} has already completed here with this file and seed\n           \
-         -> more generations: --generations {}\n           \
+         -> more generations{own}: --generations {}\n           \
          -> another run: --seed {}\n           \
          -> {once_more}",
         text::title(existing),
@@ -227,11 +226,11 @@ fn remarks(submitted: &[Experiment], unfinished: &[Experiment], data_dir: &Path)
     let (continued, others): (Vec<_>, Vec<_>) = unfinished.iter().partition(is_ours);
     let is_longer = |ours: &&Experiment| {
         let is_known = continued.iter().any(|other| other.id == ours.id);
-        !is_known && !has_ended(ours.state()) && ours.generations_done > 0
+        !is_known && ours.state() == ExperimentState::Running && ours.generations_done > 0
     };
     let longer = submitted.iter().filter(is_longer).map(|this| {
         format!(
-            "going on with {}, which had completed {}; a run of its own: --new",
+            "going on with {}, which had completed {}; a run of its own: --group NAME",
             text::title(this),
             text::counted(this.generations_done, "generation")
         )
@@ -265,6 +264,8 @@ fn interrupted(data_dir: &Path) -> Error {
 
 #[cfg(test)]
 mod tests {
+    use std::slice::from_ref;
+
     use super::*;
 
     fn experiment(id: u64, name: &str) -> Experiment {
@@ -302,10 +303,14 @@ mod tests {
 
     #[test]
     fn a_completed_experiment_that_goes_on_is_remarked_on() {
-        let lines = remarks(&[experiment(3, "a")], &[], Path::new("data"));
+        let state = ExperimentState::Running.into();
+        let experiment = Experiment { state, ..experiment(3, "a") };
+        let lines = remarks(from_ref(&experiment), &[], Path::new("data"));
         let expected = "going on with experiment 3 (a), which had completed 12 generations; a run \
-                        of its own: --new";
+                        of its own: --group NAME";
         assert_eq!(lines, [expected]);
+        let paused = Experiment { state: ExperimentState::Paused.into(), ..experiment };
+        assert!(remarks(&[paused], &[], Path::new("data")).is_empty());
     }
 
     #[test]

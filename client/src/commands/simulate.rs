@@ -194,7 +194,7 @@ fn mean(trials: &[Trial]) -> EpisodeSummary {
         let (sum, n) = sums.entry(name).or_insert((0.0, 0.0));
         (*sum, *n) = (*sum + value, *n + 1.0);
     }
-    let fitness: f64 = trials.iter().map(|trial| trial.summary.fitness).sum();
+    let fitness = trials.iter().fold(0.0, |sum, trial| sum + trial.summary.fitness);
     EpisodeSummary {
         fitness: fitness / trials.len() as f64,
         measures: sums.into_iter().map(|(name, (sum, n))| (name.clone(), sum / n)).collect(),

@@ -138,9 +138,9 @@ impl Remote for WorkersArgs {
         };
         let now_ms = now_ms.unwrap_or_else(clock::unix_ms);
         progress.print_table(&table(&workers, now_ms), &CSV_KEYS, &records, &empty)?;
-        text::evaluations(response.evaluations.len())
-            .iter()
-            .for_each(|remark| progress.remark(remark));
+        if let Some(remark) = text::evaluations(response.evaluations.len()) {
+            progress.remark(&connection.in_place(&remark));
+        }
         Ok(())
     }
 }

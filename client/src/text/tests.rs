@@ -49,7 +49,8 @@ fn commands_in_a_text_get_the_option_that_names_their_place() {
         at("delete those first: swarmctl delete 4; swarmctl delete 3"),
         "delete those first: swarmctl delete 4 --data-dir d; swarmctl delete 3 --data-dir d"
     );
-    for text in ["`run` has none", "see: swarmctl list --coordinator h", "no `swarmctl", "swarmctl"]
+    for text in
+        ["`run` has none", "see: swarmctl list --coordinator h", "no `swarmctl list", "swarmctl"]
     {
         assert_eq!(at(text), text);
     }

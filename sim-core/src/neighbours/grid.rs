@@ -8,7 +8,7 @@ use crate::torus::{Torus, Vec2};
 /// Largest swarm that is not sorted. In a larger one, most robots are far apart, and to compare all
 /// of them takes longer than to sort them.
 const MAX_WITHOUT_GRID: usize = 32;
-/// Most cells per robot. The number is limited because every step visits all cells, occupied or
+/// Most cells per robot. The number is limited because every sort visits all cells, occupied or
 /// not.
 const MAX_CELLS_PER_ROBOT: usize = 16;
 /// Most cells per axis, to limit memory.

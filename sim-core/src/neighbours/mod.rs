@@ -67,7 +67,8 @@ struct Found {
 }
 
 impl Neighbours {
-    /// The state before the first [`update`](Self::update), in which no robot has a neighbour.
+    /// The state before the first [`update`](Self::update), in which no robot has a neighbour. The
+    /// number of robots never changes.
     pub fn new(reach: f64, n_robots: usize) -> Self {
         let first = vec![0; n_robots + 1];
         let found = Found { first, ..Found::default() };

@@ -166,8 +166,9 @@ impl Samples {
         }
         let mut runs = self.samples.iter().flat_map(|sample| sample.runs.values());
         if runs.all(|run| run.judged.is_none() && run.history.is_none()) {
-            let why = "no champion has been judged, and no run has a history";
-            return Err(Error::WrongState(why.into()));
+            let why = "no champion has been judged, and no run has a history; name histories, too, of \
+                       `swarmctl history ID --output csv`";
+            return Err(Error::Input(why.into()));
         }
         Ok(self.samples)
     }

@@ -56,7 +56,11 @@ impl<'a> From<&'a RunningEvaluation> for Evaluation<'a> {
 }
 
 /// The reason why an evaluation waits, with the next steps.
-fn evaluation_lines(evaluation: &RunningEvaluation, n_workers: usize, address: &str) -> String {
+fn evaluation_lines(
+    evaluation: &RunningEvaluation,
+    n_workers: usize,
+    connection: &Connection,
+) -> String {
     let RunningEvaluation { name, episodes, episodes_left, .. } = evaluation;
     let done = episodes.saturating_sub(*episodes_left);
     let time = clock::duration_ms(evaluation.running_ms);
@@ -71,9 +75,9 @@ fn evaluation_lines(evaluation: &RunningEvaluation, n_workers: usize, address: &
             n => format!("none of {} takes it", text::counted(n as u64, "connected worker")),
         });
         if n_workers > 0 {
-            lines.push("  -> see why: swarmctl workers --output wide".to_owned());
+            lines.push(connection.in_place("  -> see why: swarmctl workers --output wide"));
         }
-        lines.push(format!("  -> start some: worker --coordinator {address}"));
+        lines.push(format!("  -> start some: worker --coordinator {}", connection.address()));
         lines.push("  -> or compute it without workers: swarmctl evaluate --local".to_owned());
     }
     lines.join("\n")
@@ -119,7 +123,7 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
             text::counted(slots, "slot"),
         ),
     }];
-    let lines = |evaluation| evaluation_lines(evaluation, workers.len(), connection.address());
+    let lines = |evaluation| evaluation_lines(evaluation, workers.len(), connection);
     sections.extend(evaluations.iter().map(lines));
     // Findings about the fleet come from experiments: without any, no workers are needed.
     let mut of_fleet: Vec<String> = Vec::new();
