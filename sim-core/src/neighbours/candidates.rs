@@ -121,7 +121,7 @@ impl WithSimd for Find<'_> {
             for range in grid.around(from) {
                 let n_then = n_found + range.len() + N_AT_ONCE;
                 if robots.len() < n_then {
-                    robots.resize(2 * n_then, 0);
+                    robots.resize(n_then, 0);
                 }
                 for start in range.clone().step_by(N_AT_ONCE) {
                     let end = range.end.min(start + N_AT_ONCE);
