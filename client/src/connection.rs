@@ -108,8 +108,7 @@ impl Connection {
             _ => InProcess::write(data_dir).await,
         };
         let services = services.map_err(services::refused)?;
-        let this = Self::here(data_dir, services.door().clone(), Some(services));
-        Ok(if is_found { Self { place: None, ..this } } else { this })
+        Ok(Self::here(data_dir, is_found, services.door().clone(), Some(services)))
     }
 
     /// A connection to the coordinator of the settings.
@@ -123,19 +122,17 @@ impl Connection {
     /// A connection to the coordinator in this process that computes a data directory.
     #[cfg(feature = "local")]
     pub fn computing(data_dir: &Path, door: Door) -> Self {
-        match Self::here(data_dir, door, None) {
-            this if data_dir == Path::new(DEFAULT_DATA_DIR) => Self { place: None, ..this },
-            this => this,
-        }
+        Self::here(data_dir, data_dir == Path::new(DEFAULT_DATA_DIR), door, None)
     }
 
-    fn here(data_dir: &Path, door: Door, services: Option<InProcess>) -> Self {
+    /// `is_found`: whether commands find the data directory by themselves.
+    fn here(data_dir: &Path, is_found: bool, door: Door, services: Option<InProcess>) -> Self {
         let channel = door.channel(Some(CALL_TIMEOUT));
         let here = Here { data_dir: data_dir.into(), door, services, set_going: Mutex::default() };
         let address = data_dir.display().to_string();
-        // A failure in this process is not transient.
-        let place = Some(["--data-dir".to_owned(), address.clone()]);
+        let place = (!is_found).then(|| ["--data-dir".to_owned(), address.clone()]);
         let this = Self::on(address, Way::Here(Arc::new(here)), &channel);
+        // A failure in this process is not transient.
         Self { place, ..this }.with_patience(Duration::ZERO)
     }
 

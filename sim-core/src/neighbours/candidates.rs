@@ -57,7 +57,7 @@ impl Candidates {
         self.positions.extend_from_slice(positions);
         let reach = self.reach + margin;
         self.grid.sort(torus, reach, positions);
-        Isa::best().run(Find { torus, reach, candidates: self });
+        Isa::best().run(Search { torus, reach, candidates: self });
     }
 
     /// The range of a robot's candidates.
@@ -99,14 +99,14 @@ impl WithSimd for Ways<'_> {
 }
 
 /// The search for candidates of all robots.
-struct Find<'a> {
+struct Search<'a> {
     torus: &'a Torus,
     /// Distance within which robots are candidates, cm.
     reach: f64,
     candidates: &'a mut Candidates,
 }
 
-impl WithSimd for Find<'_> {
+impl WithSimd for Search<'_> {
     type Output = ();
 
     #[inline(always)]

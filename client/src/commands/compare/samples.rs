@@ -166,8 +166,8 @@ impl Samples {
         }
         let mut runs = self.samples.iter().flat_map(|sample| sample.runs.values());
         if runs.all(|run| run.judged.is_none() && run.history.is_none()) {
-            let why = "no champion has been judged, and no run has a history; name histories, too, of \
-                       `swarmctl history ID --output csv`";
+            let why = "no champion has been judged, and no run has a history; name files of \
+                       `swarmctl history ID --output csv`, too";
             return Err(Error::Input(why.into()));
         }
         Ok(self.samples)
