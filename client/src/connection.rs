@@ -27,7 +27,6 @@ use tonic::{
 };
 
 use crate::{
-    defaults::DEFAULT_DATA_DIR,
     error::{Code, Error, is_transient, reason},
     local::services::{self, Door, InProcess},
     place::{Intent, Place},
@@ -122,7 +121,7 @@ impl Connection {
     /// A connection to the coordinator in this process that computes a data directory.
     #[cfg(feature = "local")]
     pub fn computing(data_dir: &Path, door: Door) -> Self {
-        Self::here(data_dir, data_dir == Path::new(DEFAULT_DATA_DIR), door, None)
+        Self::here(data_dir, data_dir == Path::new(crate::defaults::DEFAULT_DATA_DIR), door, None)
     }
 
     /// `is_found`: whether commands find the data directory by themselves.
