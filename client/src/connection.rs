@@ -71,8 +71,8 @@ struct Here {
 pub struct Connection {
     /// The coordinator's address, or the data directory.
     address: String,
-    /// The option that names the place, unless commands find the place by themselves.
-    place: Option<[String; 2]>,
+    /// The options that name the place; empty if commands find the place by themselves.
+    place: Vec<String>,
     way: Way,
     client: ExperimentServiceClient<Authorised>,
     evaluations: EvaluationServiceClient<Authorised>,
@@ -113,9 +113,7 @@ impl Connection {
     /// A connection to the coordinator of the settings.
     pub fn at(settings: &Settings) -> Result<Self, Error> {
         let connection = Self::new(settings.address(), &settings.credentials()?)?;
-        let said = settings.is_coordinator_said.then_some("--coordinator");
-        let place = said.map(|option| [option, settings.address()].map(str::to_owned));
-        Ok(Self { place, ..connection })
+        Ok(Self { place: settings.said.clone(), ..connection })
     }
 
     /// A connection to the coordinator in this process that computes a data directory.
@@ -129,7 +127,10 @@ impl Connection {
         let channel = door.channel(Some(CALL_TIMEOUT));
         let here = Here { data_dir: data_dir.into(), door, services, set_going: Mutex::default() };
         let address = data_dir.display().to_string();
-        let place = (!is_found).then(|| ["--data-dir".to_owned(), address.clone()]);
+        let place = match is_found {
+            true => Vec::new(),
+            false => vec!["--data-dir".to_owned(), address.clone()],
+        };
         let this = Self::on(address, Way::Here(Arc::new(here)), &channel);
         // A failure in this process is not transient.
         Self { place, ..this }.with_patience(Duration::ZERO)
@@ -148,7 +149,7 @@ impl Connection {
         let fleet = FleetServiceClient::with_interceptor(channel.clone(), way.bearer())
             .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
-        Self { address, place: None, way, client, evaluations, fleet, patience: PATIENCE }
+        Self { address, place: Vec::new(), way, client, evaluations, fleet, patience: PATIENCE }
     }
 
     /// Ends the services that this connection has started.
@@ -172,16 +173,13 @@ impl Connection {
 
     /// A text whose commands act in the same place.
     pub fn in_place(&self, text: &str) -> String {
-        match &self.place {
-            Some(place) => text::in_place(text, &text::shell_command(place.clone())),
-            None => text.to_owned(),
-        }
+        text::in_place(text, &text::shell_command(self.place.clone()))
     }
 
     /// The line of a command that acts in the same place.
     pub fn command(&self, words: &[&str]) -> String {
         let words = iter::once("swarmctl").chain(words.iter().copied()).map(str::to_owned);
-        text::shell_command(words.chain(self.place.clone().into_iter().flatten()))
+        text::shell_command(words.chain(self.place.iter().cloned()))
     }
 
     /// Whether this process, and no other, computes experiments.

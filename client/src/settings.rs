@@ -2,7 +2,9 @@
 //! file, else the default address.
 
 use std::{
-    env, io,
+    env,
+    ffi::OsString,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -61,10 +63,10 @@ pub struct Settings {
     pub token_file: Option<PathBuf>,
     #[command(flatten)]
     pub credentials: CredentialArgs,
-    /// Whether the command line names the coordinator, and the environment does not: a further
-    /// command would perhaps not find it by itself.
+    /// The words of the command line that give these settings, without those that the environment
+    /// gives as well: a further command needs them to reach the same coordinator.
     #[arg(skip)]
-    pub is_coordinator_said: bool,
+    pub said: Vec<String>,
 }
 
 /// The settings file: the same settings, under the names of their flags.
@@ -84,8 +86,7 @@ impl Settings {
     /// These settings, completed from the settings file.
     pub fn or_file(self) -> Result<Self, Error> {
         let mut this = self.without_empty();
-        this.is_coordinator_said =
-            this.has_coordinator() && this.coordinator != env::var(COORDINATOR_VARIABLE).ok();
+        this.said = this.words(|variable| env::var_os(variable));
         let (path, must_exist) = match env::var_os(FILE_VARIABLE).filter(|path| !path.is_empty()) {
             Some(path) => (PathBuf::from(path), true),
             None => match user_file() {
@@ -108,6 +109,29 @@ impl Settings {
             others.token_file = None;
         }
         Ok(this.or(others))
+    }
+
+    /// The options that give these settings, except where a variable has the same value.
+    fn words(&self, variable: impl Fn(&str) -> Option<OsString>) -> Vec<String> {
+        let CredentialArgs { tls_ca, tls_cert, tls_key, tls_domain, plaintext } = &self.credentials;
+        let text = |text: &Option<String>| text.clone().map(OsString::from);
+        let path = |path: &Option<PathBuf>| path.clone().map(OsString::from);
+        let values = [
+            ("--coordinator", COORDINATOR_VARIABLE, text(&self.coordinator)),
+            ("--token-file", "SWARM_CLIENT_TOKEN_FILE", path(&self.token_file)),
+            ("--tls-ca", "SWARM_TLS_CA", path(tls_ca)),
+            ("--tls-cert", "SWARM_TLS_CERT", path(tls_cert)),
+            ("--tls-key", "SWARM_TLS_KEY", path(tls_key)),
+            ("--tls-domain", "SWARM_TLS_DOMAIN", text(tls_domain)),
+        ];
+        let said = values.into_iter().filter(|(_, name, value)| *value != variable(name));
+        let said = said.filter_map(|(option, _, value)| Some([option.into(), value?]));
+        let mut words: Vec<String> =
+            said.flatten().map(|word: OsString| word.to_string_lossy().into_owned()).collect();
+        if *plaintext && variable("SWARM_PLAINTEXT").is_none() {
+            words.push("--plaintext".into());
+        }
+        words
     }
 
     /// Whether the command line or the environment names a coordinator.
@@ -150,7 +174,7 @@ impl Settings {
                 tls_domain: these.tls_domain.or(those.tls_domain),
                 plaintext: these.plaintext || those.plaintext,
             },
-            is_coordinator_said: self.is_coordinator_said,
+            said: self.said,
         }
     }
 }
@@ -170,7 +194,7 @@ impl SettingsFile {
                 tls_domain: self.tls_domain,
                 plaintext: self.plaintext,
             },
-            is_coordinator_said: false,
+            said: Vec::new(),
         }
     }
 }
@@ -200,6 +224,7 @@ fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::text::shell_command;
 
     fn settings(address: Option<&str>) -> Settings {
         Settings { coordinator: address.map(str::to_owned), ..Settings::default() }
@@ -221,13 +246,47 @@ mod tests {
     }
 
     #[test]
+    fn further_commands_repeat_the_options_that_the_environment_does_not_give() {
+        let given = Settings {
+            token_file: Some("client token".into()),
+            credentials: CredentialArgs {
+                tls_ca: Some("ca.pem".into()),
+                tls_cert: Some("c.pem".into()),
+                tls_key: Some("c.key".into()),
+                tls_domain: Some("name".into()),
+                plaintext: true,
+            },
+            ..settings(Some("https://h:1"))
+        };
+        let all = given.words(|_| None);
+        assert_eq!(
+            shell_command(all.clone()),
+            "--coordinator https://h:1 --token-file 'client token' --tls-ca ca.pem --tls-cert c.pem \
+             --tls-key c.key --tls-domain name --plaintext"
+        );
+        let command = Settings::augment_args(clap::Command::new("swarmctl"));
+        for option in command.get_arguments() {
+            let Some(variable) = option.get_env() else { continue };
+            let name = format!("--{}", option.get_long().unwrap());
+            let at = all.iter().position(|word| *word == name).unwrap();
+            let value = all.get(at + 1).map_or("1", String::as_str);
+            let set_to = |value: &str| {
+                given.words(|asked| (asked == variable).then(|| OsString::from(value)))
+            };
+            assert!(!set_to(value).contains(&name), "{name}");
+            assert_eq!(set_to("another") == all, name != "--plaintext", "{name}");
+        }
+        assert_eq!(settings(None).words(|_| None), Vec::<String>::new());
+    }
+
+    #[test]
     fn every_flag_has_its_key_and_files_are_beside_the_settings() {
         let text = r#"{
             "coordinator": "https://h:1", "token-file": "client.token", "tls-ca": "/etc/ca.pem",
             "tls-cert": "c.pem", "tls-key": "c.key", "tls-domain": "name", "plaintext": true
         }"#;
         let expected = Settings {
-            is_coordinator_said: false,
+            said: Vec::new(),
             coordinator: Some("https://h:1".into()),
             data_dir: None,
             token_file: Some("/home/ada/client.token".into()),

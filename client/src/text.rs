@@ -365,6 +365,19 @@ pub fn deserted(experiment: &Experiment, data_dir: &Path) -> String {
     )
 }
 
+/// The answer that no event of these experiments has this sequence number or a later one.
+pub fn no_events(experiments: &[Experiment], from_sequence: u64) -> String {
+    match experiments {
+        [] => "there are no experiments yet, and so no events".into(),
+        [one] if one.last_sequence > 0 => format!(
+            "experiment {} has no event {from_sequence} yet; its last one is {}",
+            one.id, one.last_sequence
+        ),
+        _ if from_sequence > 1 => format!("no experiment has an event {from_sequence} yet"),
+        _ => "there are no events yet".into(),
+    }
+}
+
 /// A command about an experiment of a data directory.
 pub fn command_in(command: &str, id: u64, data_dir: &Path) -> String {
     let id = id.to_string();
@@ -382,14 +395,17 @@ pub fn cut(text: &str, width: usize) -> String {
     truncate_str(text, width, "…").into_owned()
 }
 
-/// A text whose commands of `swarmctl` have an option that names their place, unless they name one.
+/// A text whose commands of `swarmctl` have the options that name their place, unless they name one.
 /// Commands are in backticks, or they are the rest of a line after a colon, separated by semicolons.
-pub fn in_place(text: &str, option: &str) -> String {
-    let with_option = |command: &str| match command {
+pub fn in_place(text: &str, options: &str) -> String {
+    if options.is_empty() {
+        return text.to_owned();
+    }
+    let with_options = |command: &str| match command {
         _ if ["--data-dir", "--coordinator"].iter().any(|named| command.contains(named)) => {
             command.to_owned()
         }
-        _ => format!("{command} {option}"),
+        _ => format!("{command} {options}"),
     };
     let line = |line: &str| {
         let mut parts: Vec<String> = line.split('`').map(str::to_owned).collect();
@@ -397,13 +413,13 @@ pub fn in_place(text: &str, option: &str) -> String {
         let n_quoted = (parts.len() - 1) / 2;
         for quoted in parts.iter_mut().skip(1).step_by(2).take(n_quoted) {
             if quoted.starts_with("swarmctl ") {
-                *quoted = with_option(quoted);
+                *quoted = with_options(quoted);
             }
         }
         if let Some(last) = parts.last_mut()
             && let Some((before, commands)) = last.split_once(": swarmctl ")
         {
-            let commands = commands.split("; swarmctl ").map(with_option);
+            let commands = commands.split("; swarmctl ").map(with_options);
             *last =
                 format!("{before}: swarmctl {}", commands.collect::<Vec<_>>().join("; swarmctl "));
         }

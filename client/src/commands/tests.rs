@@ -412,7 +412,9 @@ async fn a_name_stands_for_the_number() {
 #[tokio::test]
 async fn empty_tables_are_printed_as_sentences() {
     let script = Script { workers: vec![], past: vec![], ..script() };
-    insta::assert_snapshot!(transcript(script, &["history 3", "workers", "logs"]).await);
+    insta::assert_snapshot!(
+        transcript(script, &["history 3", "workers", "logs", "logs 3 --from 99"]).await
+    );
 }
 
 #[tokio::test]

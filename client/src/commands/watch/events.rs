@@ -6,7 +6,7 @@
 
 mod merge;
 
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, mem, path::Path};
 
 use model::wire::has_ended;
 use swarm_proto::v1::{Experiment, WatchNewsResponse};
@@ -54,6 +54,7 @@ pub async fn print(
         news.next().await?;
         experiments = chosen(&connection, wanted.subject.as_ref()).await?;
     }
+    let mut is_silent = true;
     loop {
         let with_news = experiments.iter().filter_map(|experiment| {
             let next = *positions.entry(experiment.id).or_insert(wanted.from_sequence);
@@ -61,12 +62,16 @@ pub async fn print(
         });
         let mut merge = Merge::new(&connection, with_news.collect());
         while let Some((experiment, event)) = merge.next().await? {
+            is_silent = false;
             positions.insert(experiment.id, event.sequence + 1);
             if progress.is_json() {
                 progress.print_line(&json::LogLine::new(experiment, &event))?;
             } else {
                 progress.print(&text::log_line(experiment, &event))?;
             }
+        }
+        if mem::take(&mut is_silent) && !progress.is_json() {
+            progress.print(&text::no_events(&experiments, wanted.from_sequence))?;
         }
         let is_over = wanted.subject.is_some() && experiments.iter().all(|e| has_ended(e.state()));
         if !wanted.follow || is_over {
