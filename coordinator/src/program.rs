@@ -57,7 +57,7 @@ struct Args {
     lease: u32,
     /// Share of the individuals, 0 to 1, that a second worker computes, too. If the bits
     /// differ, the coordinator computes the trial itself, and the worker that was wrong gets
-    /// no items until it is readmitted.
+    /// no items until you readmit it.
     #[arg(long, default_value_t = 0.0, value_parser = fraction)]
     audit_fraction: f64,
     /// MiB of memory that unfinished experiments may take together, as estimated from their

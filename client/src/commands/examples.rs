@@ -15,7 +15,7 @@ use crate::{
 /// List the experiments that are part of this program.
 ///
 /// `run --example NAME` and `submit --example NAME` evolve one of them, without a file.
-/// `new FILE --task NAME` writes a copy for you to change.
+/// `new NAME --task EXAMPLE` writes a copy for you to change.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ExamplesArgs {}

@@ -28,9 +28,9 @@ use super::watch;
 /// The new experiment shares the history of its parent up to that generation, and continues
 /// from the parent's state. Fitness, world, perturbations, the number of robots, trials or
 /// individuals and the seed may change; the algorithm, its parameters and the length of
-/// genotypes may not. Of a repertoire or a front, fitness and world may not either, because its
-/// elites keep the evidence of their trials. All later digests cover the changes; a fork without changes has the
-/// digests of its parent.
+/// genotypes may not. A fork of a repertoire or a front cannot change fitness or world either,
+/// because its elites keep the evidence of their trials. All later digests cover the changes; a
+/// fork without changes has the digests of its parent.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ForkArgs {

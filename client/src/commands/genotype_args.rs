@@ -24,7 +24,7 @@ use crate::{
 #[derive(Debug, Args)]
 pub struct GenotypeArgs {
     /// The genotype: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation
-    /// G; ID@G/mean, the mean of the distribution after generation G.
+    /// G; ID@G/mean, the mean of the distribution after it; 'ID@G/cell(A,B)', the elite of a cell.
     #[arg(add = ArgValueCompleter::new(complete::experiments), required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
     pub address: Option<NamedAddress>,
     /// Experiment file of --genotype, instead of an address.

@@ -44,9 +44,9 @@ const NONE_HAS_ENDED: &str = "no experiment of group `NAME` has ended";
 
 /// Delete an ended experiment, or those of a group, with all their data.
 ///
-/// Only a backup can restore it. Its number is not used again, and its forks stay. The
-/// database reuses the freed space: its file keeps its size, but backups get smaller. `prune`
-/// deletes less, `archive` nothing.
+/// Only its bundle or a backup can restore it. Its number is not used again. An experiment with
+/// forks is refused: delete its forks first. The database reuses the freed space: its file keeps
+/// its size, but backups get smaller. `prune` deletes less, `archive` nothing.
 #[derive(Debug, Args)]
 pub struct DeleteArgs {
     #[command(flatten)]

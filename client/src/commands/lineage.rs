@@ -14,8 +14,8 @@ use crate::{
     progress::Progress, remote::Remote,
 };
 
-/// Print the ancestors of an individual of a genetic algorithm, and the genes inherited from
-/// each.
+/// Print the ancestors of an individual of a genetic algorithm, a repertoire or a front, and the
+/// genes inherited from each.
 ///
 /// The command recomputes the generations from the fitness log. A gene is inherited if a parent
 /// has exactly the same value; all other genes mutated, or blend both parents. `genes` is the

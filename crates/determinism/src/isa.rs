@@ -6,8 +6,10 @@ use std::str::FromStr;
 #[cfg(target_arch = "x86_64")]
 use std::sync::LazyLock;
 
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-use pulp::Arch;
+#[cfg(target_arch = "aarch64")]
+use pulp::aarch64::Neon;
+#[cfg(target_arch = "x86_64")]
+use pulp::x86::{V3, V4};
 
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 use crate::simd::ByPulp;
@@ -22,11 +24,14 @@ pub struct Isa {
 
 #[derive(Clone, Copy)]
 enum Level {
-    /// Without a fused multiply-add.
+    /// Without a fused multiply-add; all others have one.
     Portable,
-    /// With one. Other processors have no such level, so their programs have no code of it.
-    #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-    Fused(Arch),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(V3),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(V4),
+    #[cfg(target_arch = "aarch64")]
+    Neon(Neon),
 }
 
 impl Isa {
@@ -41,16 +46,10 @@ impl Isa {
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         let levels = portable;
         #[cfg(target_arch = "x86_64")]
-        let levels = {
-            let avx2 = pulp::x86::V3::try_new().map(Arch::V3);
-            let avx512 = pulp::x86::V4::try_new().map(Arch::V4);
-            portable.chain(avx2.into_iter().chain(avx512).map(Level::Fused))
-        };
+        let levels =
+            portable.chain(V3::try_new().map(Level::Avx2)).chain(V4::try_new().map(Level::Avx512));
         #[cfg(target_arch = "aarch64")]
-        let levels = {
-            let neon = pulp::aarch64::Neon::try_new().map(Arch::Neon);
-            portable.chain(neon.into_iter().map(Level::Fused))
-        };
+        let levels = portable.chain(Neon::try_new().map(Level::Neon));
         levels.map(|level| Self { level, avoids_subnormals: is_slow_with(level) }).collect()
     }
 
@@ -59,22 +58,25 @@ impl Isa {
         match self.level {
             Level::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
-            Level::Fused(Arch::V3(_)) => "avx2",
+            Level::Avx2(_) => "avx2",
             #[cfg(target_arch = "x86_64")]
-            Level::Fused(Arch::V4(_)) => "avx512",
+            Level::Avx512(_) => "avx512",
             #[cfg(target_arch = "aarch64")]
-            Level::Fused(Arch::Neon(_)) => "neon",
-            #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-            Level::Fused(_) => "other",
+            Level::Neon(_) => "neon",
         }
     }
 
     /// Runs an operation, compiled for this level.
     pub fn run<Op: WithSimd>(self, operation: Op) -> Op::Output {
+        // `pulp::Arch` would compile it for scalar numbers as well, which no level needs.
         match self.level {
             Level::Portable => operation.with_simd(Portable),
-            #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-            Level::Fused(arch) => arch.dispatch(ByPulp(operation)),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2(simd) => pulp::Simd::vectorize(simd, ByPulp(operation)),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512(simd) => pulp::Simd::vectorize(simd, ByPulp(operation)),
+            #[cfg(target_arch = "aarch64")]
+            Level::Neon(simd) => pulp::Simd::vectorize(simd, ByPulp(operation)),
         }
     }
 
@@ -115,7 +117,7 @@ fn is_slow_with(level: Level) -> bool {
         let vendor = raw_cpuid::CpuId::new().get_vendor_info();
         vendor.is_some_and(|vendor| vendor.as_str() == "GenuineIntel")
     });
-    matches!(level, Level::Fused(_)) && *IS_INTEL
+    !matches!(level, Level::Portable) && *IS_INTEL
 }
 
 #[cfg(not(target_arch = "x86_64"))]

@@ -2,9 +2,10 @@
 //!
 //! A stream is a ChaCha8 generator. Its 256-bit key is the address: four little-endian 64-bit
 //! words, `[seed, trial set, trial, purpose]`. Its 64-bit stream number is the robot's number. A
-//! trial set ([`TrialSet`]) is the word g for generation g, g | 2^63 for its held-out trials, and
-//! 2^62 for evaluations. Streams of different addresses are independent, and no stream depends on
-//! other readers or on time. Any program with ChaCha8 can reproduce every number of a run.
+//! trial set ([`TrialSet`]) is the word g for generation g, g + 2^48 b + 2^63 for block b of its
+//! held-out trials, g + 2^62 + 2^63 for its judgement, and 2^62 for evaluations. Streams of
+//! different addresses are independent, and no stream depends on other readers or on time. Any
+//! program with ChaCha8 can reproduce every number of a run.
 //!
 //! The index of an individual is not part of an address: individuals of a
 //! generation meet the same worlds and the same noise (common random numbers).

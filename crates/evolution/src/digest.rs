@@ -5,8 +5,8 @@
 //! omits values that cannot change a bit of a generation: the name is empty, `generations` is 0,
 //! `target_fitness` and `judgement_trials` are absent. Link g is SHA-256 of link g-1 (32 bytes),
 //! g (u64), every gene of every individual, every fitness of every trial of every individual
-//! (f64, bit for bit), and every descriptor of every trial of every individual, if the experiment
-//! has descriptors; numbers little-endian, individuals in index order.
+//! (f64, bit for bit), and every descriptor or aim of every trial of every individual, if the
+//! experiment has any; numbers little-endian, individuals in index order.
 //!
 //! A fork continues the chain of its parent. If the fork changes anything that link -1 covers, an
 //! extra link follows the parent's last one: SHA-256 of `swarmevo fork digest 1\n`, the parent's

@@ -25,7 +25,8 @@ use crate::{
 #[command(after_help = HELP)]
 pub struct EvaluateArgs {
     /// The genotype to evaluate, with the file of its experiment: ID or NAME, the champion;
-    /// ID@G/I, individual I of generation G; ID@G/mean, the mean of the distribution after it.
+    /// ID@G/I, individual I of generation G; ID@G/mean, the mean of the distribution after it;
+    /// 'ID@G/cell(A,B)', the elite of a cell.
     #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments), required_unless_present = "genotype")]
     pub address: Option<NamedAddress>,
     /// File with the genotype, such as a champion file.

@@ -29,7 +29,7 @@ const ADDED: Parameter = Parameter::unit(
     "added",
     0.1,
     "Largest share of the new individuals of a generation that enter the archive, the most novel \
-     first; at least one is allowed to",
+     first; rounded up, and at least one",
 );
 const THRESHOLD: Parameter = Parameter::amount(
     "threshold",

@@ -31,7 +31,7 @@ pub const REEVALUATED: Parameter = Parameter::between(
     "reevaluated",
     [0.0, 0.9],
     0.25,
-    "Share of each generation that are elites, evaluated again; 0 for tasks without chance",
+    "Share of each generation that consists of elites, evaluated again; 0 for tasks without chance",
 );
 /// Width of the variation in all directions.
 pub const ISO_SIGMA: Parameter =
