@@ -369,7 +369,7 @@ pub fn deserted(experiment: &Experiment, data_dir: &Path) -> String {
 pub fn no_events(experiments: &[Experiment], from_sequence: u64) -> String {
     match experiments {
         [] => "there are no experiments yet, and so no events".into(),
-        [one] if one.last_sequence > 0 => format!(
+        [one] if from_sequence > one.last_sequence && one.last_sequence > 0 => format!(
             "experiment {} has no event {from_sequence} yet; its last one is {}",
             one.id, one.last_sequence
         ),
