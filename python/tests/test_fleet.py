@@ -258,7 +258,9 @@ def test_an_experiment_is_paused_resumed_and_cancelled(client, quickstart):
 
 
 def test_workers_are_listed(client):
-    assert set(client.workers()["name"]) >= {"one", "two"}
+    give_up_at = time.monotonic() + 60
+    while not set(client.workers()["name"]) >= {"one", "two"}:
+        assert time.monotonic() < give_up_at
 
 
 def test_killed_workers_and_a_killed_coordinator_change_nothing(
