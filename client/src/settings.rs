@@ -2,13 +2,11 @@
 //! file, else the default address.
 
 use std::{
-    env,
-    ffi::OsString,
-    io,
+    env, io,
     path::{Path, PathBuf},
 };
 
-use clap::{Args as ClapArgs, ValueHint};
+use clap::{Args as ClapArgs, Command, FromArgMatches, ValueHint};
 use serde::Deserialize;
 use swarm_transport::{CredentialArgs, Credentials};
 
@@ -86,7 +84,7 @@ impl Settings {
     /// These settings, completed from the settings file.
     pub fn or_file(self) -> Result<Self, Error> {
         let mut this = self.without_empty();
-        this.said = this.words(|variable| env::var_os(variable));
+        this.said = this.words(&Self::of_environment());
         let (path, must_exist) = match env::var_os(FILE_VARIABLE).filter(|path| !path.is_empty()) {
             Some(path) => (PathBuf::from(path), true),
             None => match user_file() {
@@ -111,25 +109,33 @@ impl Settings {
         Ok(this.or(others))
     }
 
-    /// The options that give these settings, except where a variable has the same value.
-    fn words(&self, variable: impl Fn(&str) -> Option<OsString>) -> Vec<String> {
-        let CredentialArgs { tls_ca, tls_cert, tls_key, tls_domain, plaintext } = &self.credentials;
-        let text = |text: &Option<String>| text.clone().map(OsString::from);
-        let path = |path: &Option<PathBuf>| path.clone().map(OsString::from);
-        let values = [
-            ("--coordinator", COORDINATOR_VARIABLE, text(&self.coordinator)),
-            ("--token-file", "SWARM_CLIENT_TOKEN_FILE", path(&self.token_file)),
-            ("--tls-ca", "SWARM_TLS_CA", path(tls_ca)),
-            ("--tls-cert", "SWARM_TLS_CERT", path(tls_cert)),
-            ("--tls-key", "SWARM_TLS_KEY", path(tls_key)),
-            ("--tls-domain", "SWARM_TLS_DOMAIN", text(tls_domain)),
-        ];
-        let said = values.into_iter().filter(|(_, name, value)| *value != variable(name));
-        let said = said.filter_map(|(option, _, value)| Some([option.into(), value?]));
-        let mut words: Vec<String> =
-            said.flatten().map(|word: OsString| word.to_string_lossy().into_owned()).collect();
-        if *plaintext && variable("SWARM_PLAINTEXT").is_none() {
-            words.push("--plaintext".into());
+    /// The settings that the environment gives alone.
+    fn of_environment() -> Self {
+        let command = Self::augment_args(Command::new("swarmctl"));
+        let matches = command.try_get_matches_from(["swarmctl"]);
+        matches.and_then(|matches| Self::from_arg_matches(&matches)).unwrap_or_default()
+    }
+
+    /// The options that give these settings, except those that the environment gives as well.
+    fn words(&self, environment: &Self) -> Vec<String> {
+        let values = |settings: &Self| {
+            let path = |path: &Option<PathBuf>| path.as_ref().map(|p| p.display().to_string());
+            let credentials = &settings.credentials;
+            [
+                ("--coordinator", settings.coordinator.clone()),
+                ("--token-file", path(&settings.token_file)),
+                ("--tls-ca", path(&credentials.tls_ca)),
+                ("--tls-cert", path(&credentials.tls_cert)),
+                ("--tls-key", path(&credentials.tls_key)),
+                ("--tls-domain", credentials.tls_domain.clone()),
+            ]
+        };
+        let both = values(self).into_iter().zip(values(environment));
+        let said = both.filter(|(own, of_environment)| own != of_environment);
+        let said = said.filter_map(|((option, value), _)| Some([option.to_owned(), value?]));
+        let mut words: Vec<String> = said.flatten().collect();
+        if self.credentials.plaintext && !environment.credentials.plaintext {
+            words.push("--plaintext".to_owned());
         }
         words
     }
@@ -226,6 +232,11 @@ mod tests {
     use super::*;
     use crate::text::shell_command;
 
+    const EVERY_KEY: &str = r#"{
+        "coordinator": "https://h:1", "token-file": "client.token", "tls-ca": "/etc/ca.pem",
+        "tls-cert": "c.pem", "tls-key": "c.key", "tls-domain": "name", "plaintext": true
+    }"#;
+
     fn settings(address: Option<&str>) -> Settings {
         Settings { coordinator: address.map(str::to_owned), ..Settings::default() }
     }
@@ -247,44 +258,25 @@ mod tests {
 
     #[test]
     fn further_commands_repeat_the_options_that_the_environment_does_not_give() {
-        let given = Settings {
-            token_file: Some("client token".into()),
-            credentials: CredentialArgs {
-                tls_ca: Some("ca.pem".into()),
-                tls_cert: Some("c.pem".into()),
-                tls_key: Some("c.key".into()),
-                tls_domain: Some("name".into()),
-                plaintext: true,
-            },
-            ..settings(Some("https://h:1"))
-        };
-        let all = given.words(|_| None);
+        let given = parse(Path::new("my files/config.json"), EVERY_KEY).unwrap();
+        let all = given.words(&Settings::default());
         assert_eq!(
             shell_command(all.clone()),
-            "--coordinator https://h:1 --token-file 'client token' --tls-ca ca.pem --tls-cert c.pem \
-             --tls-key c.key --tls-domain name --plaintext"
+            "--coordinator https://h:1 --token-file 'my files/client.token' --tls-ca /etc/ca.pem \
+             --tls-cert 'my files/c.pem' --tls-key 'my files/c.key' --tls-domain name --plaintext"
         );
-        let command = Settings::augment_args(clap::Command::new("swarmctl"));
-        for option in command.get_arguments() {
-            let Some(variable) = option.get_env() else { continue };
+        let options = Settings::augment_args(Command::new("swarmctl"));
+        for option in options.get_arguments().filter(|option| option.get_id() != "data_dir") {
             let name = format!("--{}", option.get_long().unwrap());
-            let at = all.iter().position(|word| *word == name).unwrap();
-            let value = all.get(at + 1).map_or("1", String::as_str);
-            let set_to = |value: &str| {
-                given.words(|asked| (asked == variable).then(|| OsString::from(value)))
-            };
-            assert!(!set_to(value).contains(&name), "{name}");
-            assert_eq!(set_to("another") == all, name != "--plaintext", "{name}");
+            assert!(all.contains(&name), "{name}");
         }
-        assert_eq!(settings(None).words(|_| None), Vec::<String>::new());
+        assert_eq!(given.words(&settings(Some("https://h:1"))), all[2..]);
+        assert_eq!(given.words(&settings(Some("https://h:2"))), all);
+        assert_eq!(given.words(&given), Vec::<String>::new());
     }
 
     #[test]
     fn every_flag_has_its_key_and_files_are_beside_the_settings() {
-        let text = r#"{
-            "coordinator": "https://h:1", "token-file": "client.token", "tls-ca": "/etc/ca.pem",
-            "tls-cert": "c.pem", "tls-key": "c.key", "tls-domain": "name", "plaintext": true
-        }"#;
         let expected = Settings {
             said: Vec::new(),
             coordinator: Some("https://h:1".into()),
@@ -298,7 +290,7 @@ mod tests {
                 plaintext: true,
             },
         };
-        let found = parse(Path::new("/home/ada/config.json"), text).unwrap();
+        let found = parse(Path::new("/home/ada/config.json"), EVERY_KEY).unwrap();
         assert_eq!(found, expected);
         assert_eq!(settings(None).or(found.clone()), expected);
         let said = Settings { token_file: Some("other".into()), ..settings(Some("https://h:1")) };

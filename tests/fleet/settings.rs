@@ -1,6 +1,8 @@
 //! Unreadable settings only affect commands that need them.
 
-use std::fs;
+use std::{fs, process::Command};
+
+use harness::{CoordinatorProcess, Experiment, Outcome, binary};
 
 use crate::data_directory::DataDirectory;
 
@@ -45,5 +47,37 @@ fn settings_that_cannot_be_read_stop_only_commands_that_need_a_coordinator() {
                 assert!(outcome.stderr.contains(part), "{line}: {}", outcome.stderr);
             }
         }
+    }
+}
+
+#[test]
+fn next_steps_repeat_the_options_that_the_environment_does_not_give() {
+    let coordinator = CoordinatorProcess::start();
+    coordinator.submit(&Experiment::tiny(1).path());
+    let url = coordinator.url();
+    let next_of = |environment: &[(&str, &str)], options: &[&str]| {
+        let mut command = Command::new(binary("swarmctl"));
+        command.env_remove("SWARM_COORDINATOR").env("SWARM_CONFIG", "");
+        command.envs(environment.iter().copied()).args(["delete", "1", "--yes"]).args(options);
+        let outcome = Outcome::of_command(&mut command);
+        let next = outcome.stderr.trim_end().split_once("end it first: ");
+        next.unwrap_or_else(|| panic!("{outcome:#?}")).1.to_owned()
+    };
+    let at = format!("--coordinator {url}");
+    for (environment, options, expected) in [
+        (vec![], vec!["--coordinator", &*url], format!("swarmctl cancel 1 {at}")),
+        (vec![("SWARM_COORDINATOR", &*url)], vec![], "swarmctl cancel 1".to_owned()),
+        (
+            vec![("SWARM_COORDINATOR", &*url), ("SWARM_PLAINTEXT", "0")],
+            vec!["--plaintext"],
+            "swarmctl cancel 1 --plaintext".to_owned(),
+        ),
+        (
+            vec![("SWARM_COORDINATOR", "http://127.0.0.1:1"), ("SWARM_PLAINTEXT", "1")],
+            vec!["--coordinator", &*url, "--plaintext"],
+            format!("swarmctl cancel 1 {at}"),
+        ),
+    ] {
+        assert_eq!(next_of(&environment, &options), expected, "{environment:?} {options:?}");
     }
 }
