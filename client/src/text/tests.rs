@@ -1,5 +1,7 @@
 //! Sentences for people.
 
+use std::slice;
+
 use super::*;
 
 fn summary(generation: u64) -> GenerationSummary {
@@ -54,6 +56,19 @@ fn commands_in_a_text_get_the_option_that_names_their_place() {
     {
         assert_eq!(at(text), text);
     }
+}
+
+#[test]
+fn an_empty_list_of_events_says_why() {
+    let numbered = |id, last_sequence| Experiment { id, last_sequence, ..Experiment::default() };
+    let [five, none] = [numbered(1, 5), numbered(2, 0)];
+    assert_eq!(no_events(&[], 1), "there are no experiments yet, and so no events");
+    assert_eq!(
+        no_events(slice::from_ref(&five), 6),
+        "experiment 1 has no event 6 yet; its last one is 5"
+    );
+    assert_eq!(no_events(&[five, none.clone()], 6), "no experiment has an event 6 yet");
+    assert_eq!(no_events(&[none], 1), "there are no events yet");
 }
 
 #[test]
