@@ -10,7 +10,6 @@ use super::kernel::{Blocks, Coupling, Kernel};
 use super::squash::squash;
 use crate::lanes::Lanes;
 use determinism::Isa;
-use experiment_file::InitialRates;
 
 /// Vectors per row of a chunk, at most. Without fused multiply-adds, more would gain at most 6 %,
 /// and their code is large.
@@ -58,25 +57,26 @@ impl Workspace {
 }
 
 impl Chunk {
-    /// A chunk at rest, for a workspace of chunks with up to `max_width` vectors per row.
+    /// A chunk at rest with these `rates`, row by row, for a workspace of chunks with up to
+    /// `max_width` vectors per row.
     pub fn new(
         kernel: &Kernel,
+        rates: &[f32],
         first_lane: usize,
         width: usize,
         max_width: usize,
         isa: Isa,
     ) -> Self {
         let rows = |width| Aligned::new(kernel.n_rows() * width * isa.vector_len());
-        let (state, activity) = (rows(width), rows(max_width));
+        let (mut state, mut activity) = (rows(width), rows(max_width));
         let n_lanes = width * isa.vector_len();
-        let mut chunk = Self { first_lane, width, n_lanes, state, activity };
-        for (row, y) in chunk.state.values_mut().chunks_exact_mut(n_lanes).zip(kernel.starts()) {
+        for (row, y) in state.values_mut().chunks_exact_mut(n_lanes).zip(kernel.starts()) {
             row.fill(y);
         }
-        if kernel.initial_rates == InitialRates::Activation {
-            chunk.dispatch(isa, kernel, Task::Activate);
+        for (row, &u) in activity.values_mut().chunks_exact_mut(n_lanes).zip(rates) {
+            row.fill(u);
         }
-        chunk
+        Self { first_lane, width, n_lanes, state, activity }
     }
 
     /// Advances by one environment step with constant `stimuli`, `[input][lane]`.
@@ -87,7 +87,15 @@ impl Chunk {
         stimuli: &Lanes,
         isa: Isa,
     ) {
-        self.dispatch(isa, kernel, Task::Advance(stimuli, workspace));
+        match self.width {
+            1 => isa.run(Advance::<1> { kernel, chunk: self, workspace, stimuli }),
+            2 => isa.run(Advance::<2> { kernel, chunk: self, workspace, stimuli }),
+            3 => isa.run(Advance::<3> { kernel, chunk: self, workspace, stimuli }),
+            4 => isa.run(Advance::<4> { kernel, chunk: self, workspace, stimuli }),
+            5 => isa.run(Advance::<5> { kernel, chunk: self, workspace, stimuli }),
+            6 => isa.run(Advance::<6> { kernel, chunk: self, workspace, stimuli }),
+            width => unreachable!("{width} vectors are more than max_width"),
+        }
     }
 
     /// Writes the activities of these neurons, `[neuron][lane]`. `rows`: the row of each neuron.
@@ -97,36 +105,17 @@ impl Chunk {
             activity.row_mut(neuron)[self.first_lane..][..self.n_lanes].copy_from_slice(lanes);
         }
     }
-
-    fn dispatch(&mut self, isa: Isa, kernel: &Kernel, task: Task<'_>) {
-        match self.width {
-            1 => isa.run(Work::<1> { kernel, chunk: self, task }),
-            2 => isa.run(Work::<2> { kernel, chunk: self, task }),
-            3 => isa.run(Work::<3> { kernel, chunk: self, task }),
-            4 => isa.run(Work::<4> { kernel, chunk: self, task }),
-            5 => isa.run(Work::<5> { kernel, chunk: self, task }),
-            6 => isa.run(Work::<6> { kernel, chunk: self, task }),
-            width => unreachable!("{width} vectors are more than max_width"),
-        }
-    }
 }
 
-/// A task for a chunk.
-enum Task<'a> {
-    /// u = F(y).
-    Activate,
-    /// An environment step with these stimuli.
-    Advance(&'a Lanes, &'a mut Workspace),
-}
-
-/// A task for a chunk of W vectors per row.
-struct Work<'a, const W: usize> {
+/// An environment step of a chunk of W vectors per row.
+struct Advance<'a, const W: usize> {
     kernel: &'a Kernel,
     chunk: &'a mut Chunk,
-    task: Task<'a>,
+    workspace: &'a mut Workspace,
+    stimuli: &'a Lanes,
 }
 
-impl<const W: usize> WithSimd for Work<'_, W> {
+impl<const W: usize> WithSimd for Advance<'_, W> {
     type Output = ();
 
     #[inline(always)]
@@ -134,39 +123,21 @@ impl<const W: usize> WithSimd for Work<'_, W> {
         if const { W > max_width(S::IS_FUSED) } {
             unreachable!("a chunk has at most max_width vectors per row");
         }
-        let Self { kernel, chunk, task } = self;
-        match task {
-            Task::Activate => activate::<S, W>(simd, kernel, chunk),
-            Task::Advance(stimuli, workspace) => {
-                perceive::<S, W>(simd, kernel, workspace, stimuli, chunk.first_lane);
-                for _ in 0..kernel.n_substeps {
-                    if W > max_narrow(S::IS_FUSED) {
-                        integrate_wide::<S, W>(simd, kernel, chunk, workspace);
-                    } else {
-                        integrate::<S, W>(simd, kernel, chunk, workspace);
-                    }
-                    mem::swap(&mut chunk.activity, &mut workspace.activity);
-                }
+        let Self { kernel, chunk, workspace, stimuli } = self;
+        perceive::<S, W>(simd, kernel, workspace, stimuli, chunk.first_lane);
+        for _ in 0..kernel.n_substeps {
+            if W > max_narrow(S::IS_FUSED) {
+                integrate_wide::<S, W>(simd, kernel, chunk, workspace);
+            } else {
+                integrate::<S, W>(simd, kernel, chunk, workspace);
             }
+            mem::swap(&mut chunk.activity, &mut workspace.activity);
         }
     }
 }
 
 // All vector code is inlined into `with_simd`, which is compiled for the instruction set.
 // Closures would not be inlined, hence the plain loops.
-
-/// u = F(y).
-#[inline(always)]
-fn activate<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk) {
-    let (quads, pairs) = split(kernel, rows::<S, W>(chunk.state.values()));
-    let (quads_u, pairs_u) = split_mut(kernel, rows_mut::<S, W>(chunk.activity.values_mut()));
-    for ((block, y), u) in kernel.quads.blocks.iter().zip(quads).zip(quads_u) {
-        squash(simd, block.activation, y, u);
-    }
-    for ((block, y), u) in kernel.pairs.blocks.iter().zip(pairs).zip(pairs_u) {
-        squash(simd, block.activation, y, u);
-    }
-}
 
 /// Drive of this environment step.
 #[inline(always)]

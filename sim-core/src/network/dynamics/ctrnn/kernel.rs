@@ -3,17 +3,16 @@
 use std::array;
 use std::ops::Range;
 
-use super::squash;
+use super::squash::{self, squash_in_one_lane};
 use super::wiring::{WiredBlocks, WiredCoupling, Wiring};
 use crate::network::{Network, Phenotype};
+use determinism::Isa;
 use experiment_file::{Activation, InitialRates};
 
 /// The blocks of a [`Wiring`], with the values of a genotype.
 #[derive(Debug)]
 pub(super) struct Kernel {
     pub n_substeps: u32,
-    /// u at the start.
-    pub initial_rates: InitialRates,
     pub quads: Blocks<4>,
     pub pairs: Blocks<2>,
     /// The same neurons one by one.
@@ -84,7 +83,6 @@ impl Kernel {
     pub fn compile(network: &Network, wiring: &Wiring, phenotype: &Phenotype) -> Self {
         let mut kernel = Self {
             n_substeps: network.n_substeps,
-            initial_rates: network.initial_rates,
             quads: Blocks::compile(network, &wiring.quads, phenotype),
             pairs: Blocks::compile(network, &wiring.pairs, phenotype),
             rows: Vec::new(),
@@ -99,6 +97,18 @@ impl Kernel {
     pub fn starts(&self) -> impl Iterator<Item = f32> {
         let quads = self.quads.blocks.iter().flat_map(|block| block.start);
         quads.chain(self.pairs.blocks.iter().flat_map(|block| block.start))
+    }
+
+    /// u of each row at the start.
+    pub fn start_rates(&self, initial_rates: InitialRates, isa: Isa) -> Vec<f32> {
+        let starts: Vec<f32> = self.starts().collect();
+        match initial_rates {
+            InitialRates::Zero => vec![0.0; starts.len()],
+            InitialRates::Activation => {
+                let pairs = starts.as_chunks::<2>().0.iter().zip(self.pair_activations());
+                pairs.flat_map(|(&y, function)| squash_in_one_lane(isa, function, y)).collect()
+            }
+        }
     }
 
     /// Number of inputs, up to the last one with a synapse.

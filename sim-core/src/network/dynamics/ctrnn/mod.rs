@@ -79,18 +79,19 @@ impl Ctrnn {
         }
         let n_chunks = n_vectors.div_ceil(chunk::max_width(isa.is_fused()));
         let width = n_vectors.div_ceil(n_chunks.max(1)).max(1);
+        let rates = kernel.start_rates(network.initial_rates, isa);
         let chunks = (0..n_vectors).step_by(width).map(|first| {
             let own_width = width.min(n_vectors - first);
-            Chunk::new(&kernel, first * vector_len, own_width, width, isa)
+            Chunk::new(&kernel, &rates, first * vector_len, own_width, width, isa)
         });
         let chunks = chunks.collect();
         let workspace = Workspace::new(&kernel, width, isa);
         let rest = (n_left > 0).then(|| {
-            let bundles = Bundles::new(&kernel, isa);
+            let bundles = Bundles::new(&kernel, &rates, isa);
             let first = n_vectors * vector_len;
             let remainders = (0..n_left).step_by(remainder::MAX_LANES).map(|lane| {
                 let n_lanes = remainder::MAX_LANES.min(n_left - lane);
-                Remainder::new(&bundles, first + lane, n_lanes, isa)
+                Remainder::new(&bundles, first + lane, n_lanes)
             });
             let remainders = remainders.collect();
             Rest { bundles, remainders }

@@ -11,7 +11,7 @@ use determinism::simd::{Simd, WithSimd};
 use super::super::aligned::Aligned;
 use super::super::learning::{Memory, Rule};
 use super::super::{Dynamics, Inputs};
-use super::squash::{scale, squash};
+use super::squash::{scale, squash, squash_in_one_lane};
 use crate::blueprint::{Link, RateNeurons, RateRow};
 use crate::lanes::Lanes;
 use crate::network::connections::Source;
@@ -75,14 +75,16 @@ impl PlasticCtrnn {
         let chunks = (0..n_lanes).step_by(vector_len).map(|first_lane| {
             let rows = || Aligned::new(kernel.neurons.len() * vector_len);
             let memory = Memory::new(&kernel.rule, vector_len);
-            let (mut state, activity, scratch, drive) = (rows(), rows(), rows(), rows());
-            let neurons = state.values_mut().chunks_exact_mut(vector_len).zip(&kernel.neurons);
-            neurons.for_each(|(row, neuron)| row.fill(neuron.start));
-            let mut chunk = Chunk { first_lane, state, activity, scratch, drive, memory };
-            if network.initial_rates == InitialRates::Activation {
-                isa.run(Activate { kernel: &kernel, chunk: &mut chunk });
+            let (mut state, mut activity) = (rows(), rows());
+            for (index, neuron) in kernel.neurons.iter().enumerate() {
+                let lanes = index * vector_len..(index + 1) * vector_len;
+                state.values_mut()[lanes.clone()].fill(neuron.start);
+                if network.initial_rates == InitialRates::Activation {
+                    let [u, _] = squash_in_one_lane(isa, neuron.activation, [neuron.start; 2]);
+                    activity.values_mut()[lanes].fill(u);
+                }
             }
-            chunk
+            Chunk { first_lane, state, activity, scratch: rows(), drive: rows(), memory }
         });
         let chunks = chunks.collect();
         Self { isa, kernel, chunks }
@@ -164,25 +166,6 @@ impl Dynamics for PlasticCtrnn {
                 let row = &chunk.activity.values()[neuron * n_lanes..][..n_lanes];
                 activity.row_mut(neuron)[chunk.first_lane..][..n_lanes].copy_from_slice(row);
             }
-        }
-    }
-}
-
-/// u = F(y).
-struct Activate<'a> {
-    kernel: &'a Kernel,
-    chunk: &'a mut Chunk,
-}
-
-impl WithSimd for Activate<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let states = S::as_simd_f32s(self.chunk.state.values()).0;
-        let activities = S::as_mut_simd_f32s(self.chunk.activity.values_mut()).0;
-        for ((neuron, &y), u) in self.kernel.neurons.iter().zip(states).zip(activities) {
-            *u = activate(simd, neuron.activation, y);
         }
     }
 }

@@ -11,7 +11,7 @@ use super::kernel::{Blocks, Coupling, Kernel};
 use super::squash::squash;
 use crate::lanes::Lanes;
 use determinism::Isa;
-use experiment_file::{Activation, InitialRates};
+use experiment_file::Activation;
 
 /// Lanes of a remainder, at most.
 pub(super) const MAX_LANES: usize = 4;
@@ -21,12 +21,12 @@ pub(super) const MAX_LANES: usize = 4;
 #[derive(Debug)]
 pub(super) struct Bundles {
     n_substeps: u32,
-    /// u at the start.
-    initial_rates: InitialRates,
     /// F of each bundle.
     activations: Vec<Activation>,
     /// Index of each row of the kernel among the values of a lane.
     places: Vec<usize>,
+    /// Vectors of u at the start.
+    rates: Aligned,
     /// Vectors of start, retention and drive of each bundle, as in
     /// [`Block`](super::kernel::Block).
     start: Aligned,
@@ -39,8 +39,8 @@ pub(super) struct Bundles {
 }
 
 impl Bundles {
-    /// Arranges a kernel in bundles.
-    pub fn new(kernel: &Kernel, isa: Isa) -> Self {
+    /// Arranges a kernel in bundles, with u of each row at the start.
+    pub fn new(kernel: &Kernel, rates: &[f32], isa: Isa) -> Self {
         let n = isa.vector_len();
         // All pairs of a bundle have the same activation function.
         let mut activations: Vec<Activation> = Vec::new();
@@ -63,15 +63,18 @@ impl Bundles {
         let values = || Aligned::new(len);
         let mut bundles = Self {
             n_substeps: kernel.n_substeps,
-            initial_rates: kernel.initial_rates,
             activations,
             places,
+            rates: values(),
             start: values(),
             retention: values(),
             drive: values(),
             recurrent: Aligned::new(len * n_rows),
             afferent: Aligned::new(len * n_inputs),
         };
+        for (&place, &u) in bundles.places.iter().zip(rates) {
+            bundles.rates.values_mut()[place] = u;
+        }
         bundles.fill(&kernel.quads, 0, n_rows, n_inputs, 2 * n);
         bundles.fill(&kernel.pairs, 4 * kernel.quads.blocks.len(), n_rows, n_inputs, 2 * n);
         bundles
@@ -126,22 +129,26 @@ pub(super) struct Remainder {
 
 impl Remainder {
     /// A remainder at rest, with 1 to [`MAX_LANES`] lanes.
-    pub fn new(bundles: &Bundles, first_lane: usize, n_lanes: usize, isa: Isa) -> Self {
+    pub fn new(bundles: &Bundles, first_lane: usize, n_lanes: usize) -> Self {
         let values = || Aligned::new(bundles.len() * n_lanes);
-        let (state, activity, drive, scratch) = (values(), values(), values(), values());
-        let mut remainder = Self { first_lane, n_lanes, state, activity, drive, scratch };
-        for lane in remainder.state.values_mut().chunks_exact_mut(bundles.len()) {
-            lane.copy_from_slice(bundles.start.values());
+        let (mut state, mut activity) = (values(), values());
+        for (values, start) in [(&mut state, &bundles.start), (&mut activity, &bundles.rates)] {
+            for lane in values.values_mut().chunks_exact_mut(bundles.len()) {
+                lane.copy_from_slice(start.values());
+            }
         }
-        if bundles.initial_rates == InitialRates::Activation {
-            remainder.dispatch(isa, bundles, Task::Activate);
-        }
-        remainder
+        Self { first_lane, n_lanes, state, activity, drive: values(), scratch: values() }
     }
 
     /// Advances by one environment step with constant `stimuli`, `[input][lane]`.
     pub fn advance(&mut self, bundles: &Bundles, stimuli: &Lanes, isa: Isa) {
-        self.dispatch(isa, bundles, Task::Advance(stimuli));
+        match self.n_lanes {
+            1 => isa.run(Advance::<1> { bundles, remainder: self, stimuli }),
+            2 => isa.run(Advance::<2> { bundles, remainder: self, stimuli }),
+            3 => isa.run(Advance::<3> { bundles, remainder: self, stimuli }),
+            4 => isa.run(Advance::<4> { bundles, remainder: self, stimuli }),
+            n => unreachable!("{n} lanes are more than MAX_LANES"),
+        }
     }
 
     /// Writes the activities of these neurons, `[neuron][lane]`. `rows`: the kernel's row of each
@@ -160,34 +167,16 @@ impl Remainder {
             }
         }
     }
-
-    fn dispatch(&mut self, isa: Isa, bundles: &Bundles, task: Task<'_>) {
-        match self.n_lanes {
-            1 => isa.run(Work::<1> { bundles, remainder: self, task }),
-            2 => isa.run(Work::<2> { bundles, remainder: self, task }),
-            3 => isa.run(Work::<3> { bundles, remainder: self, task }),
-            4 => isa.run(Work::<4> { bundles, remainder: self, task }),
-            n => unreachable!("{n} lanes are more than MAX_LANES"),
-        }
-    }
 }
 
-/// A task for a remainder.
-enum Task<'a> {
-    /// u = F(y).
-    Activate,
-    /// An environment step with these stimuli.
-    Advance(&'a Lanes),
-}
-
-/// A task for a remainder of L lanes.
-struct Work<'a, const L: usize> {
+/// An environment step of a remainder of L lanes.
+struct Advance<'a, const L: usize> {
     bundles: &'a Bundles,
     remainder: &'a mut Remainder,
-    task: Task<'a>,
+    stimuli: &'a Lanes,
 }
 
-impl<const L: usize> WithSimd for Work<'_, L> {
+impl<const L: usize> WithSimd for Advance<'_, L> {
     type Output = ();
 
     #[inline(always)]
@@ -195,35 +184,17 @@ impl<const L: usize> WithSimd for Work<'_, L> {
         if const { L >= S::F32_LANES } {
             unreachable!("lanes of a remainder do not fill a vector");
         }
-        let Self { bundles, remainder, task } = self;
-        match task {
-            Task::Activate => activate::<S, L>(simd, bundles, remainder),
-            Task::Advance(stimuli) => {
-                perceive::<S, L>(simd, bundles, remainder, stimuli);
-                for _ in 0..bundles.n_substeps {
-                    integrate::<S, L>(simd, bundles, remainder);
-                    mem::swap(&mut remainder.activity, &mut remainder.scratch);
-                }
-            }
+        let Self { bundles, remainder, stimuli } = self;
+        perceive::<S, L>(simd, bundles, remainder, stimuli);
+        for _ in 0..bundles.n_substeps {
+            integrate::<S, L>(simd, bundles, remainder);
+            mem::swap(&mut remainder.activity, &mut remainder.scratch);
         }
     }
 }
 
 // All vector code is inlined into `with_simd`, which is compiled for the instruction set.
 // Closures would not be inlined, hence the plain loops.
-
-/// u = F(y).
-#[inline(always)]
-fn activate<S: Simd, const L: usize>(simd: S, bundles: &Bundles, remainder: &mut Remainder) {
-    let y = pairs::<S>(remainder.state.values());
-    let u = pairs_mut::<S>(remainder.activity.values_mut());
-    for (bundle, &activation) in bundles.activations.iter().enumerate() {
-        for lane in 0..L {
-            let index = lane * bundles.activations.len() + bundle;
-            squash_one(simd, activation, y[index], &mut u[index]);
-        }
-    }
-}
 
 /// Drive of this environment step.
 #[inline(always)]
@@ -299,16 +270,6 @@ fn accumulate<S: Simd>(simd: S, sums: &mut [S::f32s; 2], weights: &[S::f32s; 2],
     for (sum, weight) in sums.iter_mut().zip(weights) {
         *sum = simd.mul_add_f32s(*weight, activity, *sum);
     }
-}
-
-/// u = F(y) of a bundle in one lane.
-#[inline(always)]
-fn squash_one<S: Simd>(simd: S, activation: Activation, y: [S::f32s; 2], u: &mut [S::f32s; 2]) {
-    let [first, second] = y;
-    let mut activity = [[first], [second]];
-    squash(simd, activation, &[[first], [second]], &mut activity);
-    let [[first], [second]] = activity;
-    *u = [first, second];
 }
 
 /// Values as the two vectors of bundles.

@@ -10,7 +10,8 @@
 
 use std::f64::consts::LOG2_E;
 
-use determinism::simd::Simd;
+use determinism::Isa;
+use determinism::simd::{Simd, WithSimd, bytemuck};
 
 use crate::exp2::{Exp2, exp2_parts};
 use experiment_file::Activation;
@@ -20,6 +21,28 @@ pub(super) fn scale(activation: Activation) -> f64 {
     match activation {
         Activation::Sigmoid => -LOG2_E,
         Activation::Tanh => 2.0 * LOG2_E,
+    }
+}
+
+/// u = F(y) of a pair of neurons in one lane.
+pub(super) fn squash_in_one_lane(isa: Isa, activation: Activation, y: [f32; 2]) -> [f32; 2] {
+    isa.run(Pair { activation, y })
+}
+
+struct Pair {
+    activation: Activation,
+    y: [f32; 2],
+}
+
+impl WithSimd for Pair {
+    type Output = [f32; 2];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [f32; 2] {
+        let y = [[simd.splat_f32s(self.y[0])], [simd.splat_f32s(self.y[1])]];
+        let mut u = y;
+        squash(simd, self.activation, &y, &mut u);
+        [bytemuck::cast_slice(&u[0])[0], bytemuck::cast_slice(&u[1])[0]]
     }
 }
 

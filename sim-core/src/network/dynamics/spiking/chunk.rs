@@ -188,7 +188,8 @@ impl Chunk {
             let draws = inputs.draws;
             let propagate = Propagate::<W, PLASTIC> { circuit, chunk: self, draws, substep };
             isa.run(InRows::<_, W>(propagate));
-            if self.receptors.as_ref().is_some_and(ReceptorState::is_tiny) {
+            let is_tiny = self.receptors.as_ref().is_some_and(ReceptorState::is_tiny);
+            if is_tiny && isa.is_fused() {
                 let integrate = Integrate::<_, C, Z, W, true> { circuit, neurons, chunk: self };
                 isa.run(InRows::<_, W>(integrate));
             } else {
@@ -289,8 +290,8 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
 }
 
 /// Computes the spikes of encoders' nodes in a substep, and the current of every neuron from
-/// these and from the neurons' spikes in the previous substep. It leaves currents through tiny
-/// receptors to [`Integrate`].
+/// these and from the neurons' spikes in the previous substep. It only bounds currents through tiny
+/// receptors.
 struct Propagate<'a, const W: usize, const PLASTIC: bool> {
     circuit: &'a Circuit,
     chunk: &'a mut Chunk,
@@ -324,10 +325,12 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Propagate<'_, W, PLASTIC>
         }
         if let (Some(receptors), Some(held)) = (&circuit.receptors, &mut chunk.receptors) {
             receptors.open::<S, W>(simd, held, spikes);
-            if S::IS_FUSED && held.is_tiny() {
+            let states = vectors::<S, W>(chunk.state.values());
+            if S::IS_FUSED && !PLASTIC && held.is_tiny() {
+                let voltages = states.iter().step_by(chunk.n_variables);
+                receptors.bound_flows::<S, W>(simd, held, voltages, currents);
                 return;
             }
-            let states = vectors::<S, W>(chunk.state.values());
             for (neuron, current) in currents.iter_mut().enumerate() {
                 let at = (neuron, Row::new(simd, states[neuron * chunk.n_variables]));
                 let before = Row::new(simd, *current);
@@ -374,6 +377,9 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize, const TINY:
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        if const { TINY && !S::IS_FUSED } {
+            unreachable!("without fused multiply-adds, there are no detours");
+        }
         let Self { circuit, neurons, chunk } = self;
         let (zero, one) = (Row::splat(simd, 0.0), Row::splat(simd, 1.0));
         let states = vectors_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<Z>().0;
@@ -391,8 +397,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize, const TINY:
                 *value = Row::new(simd, vectors);
             }
             let current = Row::new(simd, currents[neuron]);
-            let (state, spiked) = if S::IS_FUSED
-                && TINY
+            let (state, spiked) = if TINY
                 && let (Some(receptors), Some(held)) = (&circuit.receptors, &chunk.receptors)
             {
                 update_by_bounds::<S, M, C, Z, W>(receptors, held, neuron, splat, state, current)
@@ -410,7 +415,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize, const TINY:
     }
 }
 
-/// One Euler step of a neuron with a current and those through its receptors. Computes the step
+/// One Euler step of a neuron with a current and flows through its receptors. Computes the step
 /// from two bounds of their sum, and only if these disagree about any lane, from the sum itself.
 #[inline(always)]
 fn update_by_bounds<S: Simd, M: Model<C, Z>, const C: usize, const Z: usize, const W: usize>(
@@ -422,15 +427,19 @@ fn update_by_bounds<S: Simd, M: Model<C, Z>, const C: usize, const Z: usize, con
     current: Row<S, W>,
 ) -> ([Row<S, W>; Z], Mask<S, W>) {
     let (simd, at) = (current.simd, (neuron, state[0]));
-    let [low, high] = receptors.add_bounds_of_flows(simd, held, at, current);
-    let (from_low, low_spiked) = M::update(constants, state, low);
-    let (from_high, high_spiked) = M::update(constants, state, high);
-    let is_decided = agree([from_low[0], from_high[0]]).and(low_spiked.equals(high_spiked));
-    if is_decided.is_all() {
-        (from_low, low_spiked)
-    } else {
-        let sum = receptors.add_flows::<S, W, false>(simd, &[], held, at, current);
-        M::update(constants, state, sum)
+    let [low, high] = held.bounds_of_current(simd, neuron);
+    let (mut currents, mut is_exact) = ([low, high], false);
+    // The sum takes the place of its bounds, rather than a third copy of the model's equations, for
+    // which a compiler would need a quarter more time.
+    loop {
+        let (from_low, low_spiked) = M::update(constants, state, currents[0]);
+        let (from_high, high_spiked) = M::update(constants, state, currents[1]);
+        let is_decided = agree([from_low[0], from_high[0]]).and(low_spiked.equals(high_spiked));
+        if is_exact || is_decided.is_all() {
+            return (from_low, low_spiked);
+        }
+        currents = [receptors.add_flows::<S, W, false>(simd, &[], held, at, current); 2];
+        is_exact = true;
     }
 }
 

@@ -61,6 +61,8 @@ pub(super) struct ReceptorState {
     is_tiny: bool,
     /// Bounds of the variables, up to date while `is_tiny`: `[axon][variable][bound][lane]`.
     enclosed: Aligned,
+    /// Bounds of the neurons' currents, up to date while `is_tiny`: `[neuron][bound][lane]`.
+    bounds: Aligned,
 }
 
 impl Receptors {
@@ -166,17 +168,24 @@ impl Receptors {
         self.add_flows_of::<S, W, 1, PLASTIC>(simd, weights, open, at, [current])[0]
     }
 
-    /// A lower and an upper bound of [`add_flows`](Self::add_flows), without subnormal numbers.
+    /// Bounds the sum of each neuron's current and the flows through its receptors, without
+    /// subnormal numbers. [`ReceptorState::bounds_of_current`] gives these bounds.
     #[inline(always)]
-    pub fn add_bounds_of_flows<S: Simd, const W: usize>(
+    pub fn bound_flows<'a, S: Simd, const W: usize>(
         &self,
         simd: S,
-        held: &ReceptorState,
-        at: (usize, Row<S, W>),
-        current: Row<S, W>,
-    ) -> [Row<S, W>; 2] {
+        held: &mut ReceptorState,
+        voltages: impl Iterator<Item = &'a [S::f32s; W]>,
+        currents: &[[S::f32s; W]],
+    ) {
         let open = vectors::<S, W>(held.enclosed.values()).as_chunks().0.as_chunks().0;
-        self.add_flows_of::<S, W, 2, false>(simd, &[], open, at, [current; 2])
+        let bounds = vectors_mut::<S, W>(held.bounds.values_mut()).as_chunks_mut::<2>().0;
+        for (neuron, ((&v, &current), bounds)) in voltages.zip(currents).zip(bounds).enumerate() {
+            let (at, current) = ((neuron, Row::new(simd, v)), Row::new(simd, current));
+            let [low, high] =
+                self.add_flows_of::<S, W, 2, false>(simd, &[], open, at, [current; 2]);
+            *bounds = [low.vectors, high.vectors];
+        }
     }
 
     /// Adds flows. `open`: N values of each variable of each axon, either the exact one or a lower
@@ -253,6 +262,7 @@ impl ReceptorState {
             avoids_subnormals,
             is_tiny: false,
             enclosed: rows(n_bounds),
+            bounds: rows(if avoids_subnormals { 2 } else { 0 }),
         }
     }
 
@@ -260,6 +270,17 @@ impl ReceptorState {
     #[cfg(test)]
     pub fn variables_mut(&mut self) -> &mut [f32] {
         self.open.values_mut()
+    }
+
+    /// A lower and an upper bound of a neuron's current.
+    #[inline(always)]
+    pub fn bounds_of_current<S: Simd, const W: usize>(
+        &self,
+        simd: S,
+        neuron: usize,
+    ) -> [Row<S, W>; 2] {
+        let [low, high] = vectors::<S, W>(self.bounds.values()).as_chunks::<2>().0[neuron];
+        [Row::new(simd, low), Row::new(simd, high)]
     }
 
     /// Whether receptors may be subnormal, so that bounds are faster than the flows through them.

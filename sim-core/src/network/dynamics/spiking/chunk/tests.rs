@@ -52,7 +52,10 @@ impl WithSimd for BothWays<'_> {
         let constants = [rate, rest, 1.0, threshold, 3.0].map(|x| Row::<S, 1>::splat(simd, x));
         let v = Row::new(simd, vectors::<S, 1>(&voltages[..S::F32_LANES])[0]);
         let mut results = [Vec::new(), Vec::new()];
-        for neuron in 0..circuit.n_neurons {
+        let n_neurons = circuit.n_neurons;
+        let (voltages, currents) = (vec![v.vectors; n_neurons], vec![zero.vectors; n_neurons]);
+        receptors.bound_flows::<S, 1>(simd, &mut held, voltages.iter(), &currents);
+        for neuron in 0..n_neurons {
             let state = [v, zero];
             let by_bounds = update_by_bounds::<S, Lif, 5, 2, 1>(
                 receptors, &held, neuron, constants, state, zero,
