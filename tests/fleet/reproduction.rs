@@ -15,8 +15,8 @@ use harness::{Outcome, binary, skipped_for_want_of, swarmctl, workspace_file};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Number of generations to repeat of the first run of each experiment: `SWARM_TEST_GENERATIONS`;
-/// `.ci/run` sets 2. Without it, the tests repeat one generation of one run per algorithm, and
+/// Number of generations to repeat of the first run of each experiment: `SWARM_TEST_GENERATIONS`.
+/// Two take minutes. Without it, the tests repeat one generation of one run per algorithm, and
 /// evaluations that cover each task and each kind of neurons.
 fn n_generations() -> Option<usize> {
     let text = env::var("SWARM_TEST_GENERATIONS").ok()?;

@@ -35,7 +35,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
 # A time limit that only a hanging page exceeds.
-DEADLINE = 120
+DEADLINE = 300
 # A phone's, pixels.
 NARROW = 390
 

@@ -11,8 +11,7 @@ use sim_core::{Simulation, StepRecord};
 /// Number of damaged variants of each valid file.
 const N_VARIANTS: u64 = 20;
 
-/// Number of valid files: `SWARM_TEST_FILES`, by default 150. `.ci/run` uses 5,000, which takes
-/// half a minute of CPU.
+/// Number of valid files: `SWARM_TEST_FILES`, by default 150; 5,000 take half a minute of CPU.
 pub fn n_files() -> u64 {
     let text = env::var("SWARM_TEST_FILES").unwrap_or_else(|_| "150".to_owned());
     text.parse().unwrap_or_else(|_| panic!("SWARM_TEST_FILES is {text}, not a number"))
