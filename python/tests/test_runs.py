@@ -223,7 +223,9 @@ def test_stored_runs_are_sound_and_verifiable(short, programs, tmp_path):
 
 def test_ctrl_c_ends_a_long_run_at_once_and_keeps_it(tmp_path):
     script = """
-import sys, swarmevo
+import signal, sys, swarmevo
+# Children of a shell's background job inherit that they ignore Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 experiment = swarmevo.Experiment.quickstart().replace(evaluation_steps=3000, num_evaluations=100, population_size=200)
 small = experiment.replace(evaluation_steps=30, num_evaluations=1)
 try:
