@@ -76,7 +76,7 @@ function digestOf(nGenerations) {
   }
 }
 
-/** Runs the fleet of the page, which treats workers badly, for some generations of quickstart. */
+/** Runs the fleet of the page for some generations of quickstart, and treats workers badly on the way. */
 function breakFleet(nGenerations) {
   const call = start();
   let [{ report, workers }] = call({ call: "begin-fleets", audits: 1 });

@@ -429,8 +429,8 @@ fn update_by_bounds<S: Simd, M: Model<C, Z>, const C: usize, const Z: usize, con
     let (simd, at) = (current.simd, (neuron, state[0]));
     let [low, high] = held.bounds_of_current(simd, neuron);
     let (mut currents, mut is_exact) = ([low, high], false);
-    // The sum takes the place of its bounds, rather than a third copy of the model's equations, for
-    // which a compiler would need a quarter more time.
+    // The sum takes the place of its bounds: a third copy of the model's equations would only take
+    // a compiler's time.
     loop {
         let (from_low, low_spiked) = M::update(constants, state, currents[0]);
         let (from_high, high_spiked) = M::update(constants, state, currents[1]);
